@@ -1,8 +1,5 @@
-"""Angle of repose: the slope of both flanks of the heap, compared with the measured law for glass beads and with another code.
-
-V&V 20: the error E = S − D of a simulated value S against the datum D is known within U_val, U_val² = U_sim² + U_num² + U_input² +
-U_D². U_input follows from the exponents with which the angle grows with each coefficient (fit of Zhou et al. to their simulations).
-"""
+"""Angle of repose: slope of both flanks of the heap, compared with the measured law for glass beads and with another code. V&V 20: E = S −
+D is known within U_val, U_val² = U_sim² + U_num² + U_input² + U_D²; U_input by the exponents of Zhou et al. for each coefficient."""
 
 import math
 from pathlib import Path

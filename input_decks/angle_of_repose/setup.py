@@ -9,10 +9,8 @@ from dembark.input_decks.common.setup import Parameters, Setup, contacts, rows_a
 
 
 def setup(p: Parameters) -> Setup:
-    """The plate is 0 < x < plate_width, z = 0; its side walls stand at its ends and move outwards by the outlet at the first frame.
-
-    20 rows of time.csv between two frames. With confinement, front and rear walls stand at y = 0 and y = thickness.
-    """
+    """The plate is 0 < x < plate_width, z = 0; its side walls stand at its ends and move outwards by the outlet at the first frame. 20 rows
+    of time.csv between two frames. With confinement, front and rear walls stand at y = 0 and y = thickness."""
     step, d, d_max = time_step(p), p.grain_diameter, packing.largest(p)
     output = rows_and_frames(step, p.settle_time, p.discharge_time, p.frames)
     walled = p.confinement > 0.0

@@ -11,19 +11,8 @@ from dembark.input_decks.common.momentum import imbalance, impulses, left_to, wa
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc import GrainFrame
 from dembark.postproc.history import reached
-from dembark.postproc.measurement import (
-    Array,
-    Curve,
-    Measurement,
-    Points,
-    Replica,
-    Replicas,
-    Value,
-    block_mean,
-    exact,
-    over_replicas,
-    profile,
-)
+from dembark.postproc.measurement import Curve, Measurement, Points, Replicas, Value, block_mean, exact, over_replicas, profile
+from dembark.postproc.replica import Array, Replica
 from dembark.postproc.studies import measured
 
 from .slope_flow import Slope, front_law, layers, mean_power
@@ -33,9 +22,8 @@ REST, SLOW = 0.25, 0.36
 
 
 def slope(replica: Replica) -> Slope:
-    """Of a run."""
-    p = replica.parameters
-    d = float(p["grain_diameter"])
+    """The floor of a run."""
+    p, d = replica.parameters, float(replica.parameters["grain_diameter"])
     return Slope(p["slope_angle"], d, d * (p["slab_depth"] or 1.0))
 
 
@@ -43,12 +31,7 @@ def measure(replicas: Replicas) -> Measurement:
     """Values, curves and remarks from all replicas of a series."""
     balance = {"energy_balance": Value(exact(max(imbalance(replica.times()) for replica in replicas)), exact(0.0))}
     p = replicas[0].parameters
-    if p["bed_height"] > 0.0:
-        found = _chute(replicas)
-    elif p["grain_released"] == 1:
-        found = _single(replicas[0])
-    else:
-        found = _avalanche(replicas)
+    found = _chute(replicas) if p["bed_height"] > 0.0 else _single(replicas[0]) if p["grain_released"] == 1 else _avalanche(replicas)
     return Measurement({**balance, **found.values}, found.profiles, found.remarks)
 
 
@@ -201,10 +184,9 @@ def _chute(replicas: Replicas) -> Measurement:
                               vertical=True))
     values = {"bed_depth": Value(over_chaotic(depths)), "mean_speed": Value(over_replicas(means))}
     if p["slope_angle"] <= REST:
-        last = max(abs(one.value) for one in means)
-        values["rest_speed"] = Value(exact(last), exact(0.0))
-        return Measurement(values, curves)
-    values["profile_power"] = Value(over_replicas(powers), exact(1.0 if p["slope_angle"] <= SLOW else 1.5))
+        values["rest_speed"] = Value(exact(max(abs(one.value) for one in means)), exact(0.0))
+    else:
+        values["profile_power"] = Value(over_replicas(powers), exact(1.0 if p["slope_angle"] <= SLOW else 1.5))
     return Measurement(values, curves)
 
 

@@ -9,20 +9,22 @@ import numpy as np
 from dembark.input_decks.common import packing
 from dembark.input_decks.common.setup import Array, Parameters, Setup, contacts, rectangle, rows_and_frames, time_step
 
+# Unit vectors along the flat, or a chute, and along its normal.
+LEVEL = (np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+
 
 def setup(p: Parameters) -> Setup:
     """The toe of the slope is the origin, x points down the slope and along the flat. On a chute gravity is tilted instead of the floor.
-
     The gate begins to move at the first frame; 20 rows of time.csv between two frames. Bodies: grains, then the glued ones of the floor, of
-    the gate and of the obstacle.
-    """
+    the gate and of the obstacle."""
     step, d = time_step(p), p.grain_diameter
     output = rows_and_frames(step, p.settle_time, p.flow_time, p.frames)
     chute, slab = p.bed_height > 0, p.slab_depth > 0
     depth = p.slab_depth * d
     sites, speeds = (_bed(p) if chute else (_release(p), lambda _: np.empty(0)))
     floor = _floor(p) if p.floor == "grains" else np.empty((0, 3))
-    gate, obstacle = (np.empty((0, 3)), np.empty((0, 3))) if chute else (_gate(p), _obstacle(p))
+    gate = np.empty((0, 3)) if chute else _upright(p, -p.gate_place, p.gate_height, _slope(p))
+    obstacle = np.empty((0, 3)) if chute else _upright(p, p.obstacle_place, p.obstacle_height, LEVEL)
     glued = np.vstack([floor, gate, obstacle])
     along, up = _slope(p)
     lift = 3.0 * packing.largest(p)
@@ -105,8 +107,7 @@ def _bed(p: Parameters) -> tuple[Array, Callable[[Array], Array]]:
     across, count = _across(p, least / d), int(p.chute_length * d / least)
     along = p.chute_length * d * (np.arange(count) + 0.5) / count
     layers = math.ceil(1.3 * p.grain_count / (count * len(across)))
-    sites = _grid(along, across, least * (np.arange(layers) + 0.8), (np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])))
-
+    sites = _grid(along, across, least * (np.arange(layers) + 0.8), LEVEL)
     return sites, lambda height: 2.0 * p.start_speed * height / (layers * least)
 
 
@@ -114,14 +115,13 @@ def _floor(p: Parameters) -> Array:
     """The floor's glued grains: `floor_spacing` apart, their tops up to d/10 off the surface at random."""
     d, gap = p.grain_diameter, p.floor_spacing
     across = _across(p, gap)
-    level = (np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
     if p.bed_height > 0:
         count = round(p.chute_length / gap)
-        places, normals = _grid(p.chute_length * d * (np.arange(count) + 0.5) / count, across, np.zeros(1), level), level[1]
-        return places + _rough(p, len(places))[:, None] * normals
+        places = _grid(p.chute_length * d * (np.arange(count) + 0.5) / count, across, np.zeros(1), LEVEL)
+        return places + _rough(p, len(places))[:, None] * LEVEL[1]
     down = _grid(-gap * d * (np.arange(int(p.slope_length / gap)) + 0.5)[::-1], across, np.zeros(1), _slope(p))
-    flat = _grid(gap * d * (np.arange(int(p.flat_length / gap)) + 0.5), across, np.zeros(1), level)
-    normals = np.vstack([np.tile(_slope(p)[1], (len(down), 1)), np.tile(level[1], (len(flat), 1))])
+    flat = _grid(gap * d * (np.arange(int(p.flat_length / gap)) + 0.5), across, np.zeros(1), LEVEL)
+    normals = np.vstack([np.tile(_slope(p)[1], (len(down), 1)), np.tile(LEVEL[1], (len(flat), 1))])
     return np.vstack([down, flat]) + _rough(p, len(normals))[:, None] * normals
 
 
@@ -130,25 +130,17 @@ def _rough(p: Parameters, count: int) -> Array:
     return p.grain_diameter * (0.2 * (packing.uniform(p.grain_count + np.arange(1, count + 1), p.seed, 2) - 0.5) - 0.5)
 
 
-def _gate(p: Parameters) -> Array:
-    """Glued grains side by side, across the slope, off the strips."""
+def _upright(p: Parameters, place: float, height: float, axes: tuple[Array, Array]) -> Array:
+    """Glued grains side by side in a row upright on the floor, off the strips; place and height over the diameter."""
     d = p.grain_diameter
-    return _grid(np.array([-p.gate_place * d]), _across(p, 1.0), d * (np.arange(math.ceil(p.gate_height)) + 0.52), _slope(p))
-
-
-def _obstacle(p: Parameters) -> Array:
-    """Glued grains side by side, upright on the flat."""
-    d = p.grain_diameter
-    return _grid(np.array([p.obstacle_place * d]), _across(p, 1.0), d * (np.arange(math.ceil(p.obstacle_height)) + 0.52),
-                 (np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])))
+    return _grid(np.array([place * d]), _across(p, 1.0), d * (np.arange(math.ceil(height)) + 0.52), axes)
 
 
 def _strips(p: Parameters) -> Array:
     """Triangles (n, 3, 3) in m of slope and flat, in panels of about 10 d."""
     d, (along, _) = p.grain_diameter, _slope(p)
     half, panels = 2.0 * d, []
-    level = np.array([1.0, 0.0, 0.0])
-    for start, length, way in ((-p.slope_length * d * along, p.slope_length, along), (np.zeros(3), p.flat_length, level)):
+    for start, length, way in ((-p.slope_length * d * along, p.slope_length, along), (np.zeros(3), p.flat_length, LEVEL[0])):
         count = math.ceil(0.1 * length)
         side = length * d / count * way
         panels += [rectangle(start + side * k - np.array([0.0, half, 0.0]), side, (0.0, 2.0 * half, 0.0)) for k in range(count)]

@@ -1,7 +1,5 @@
-"""Grains on a slope that ends on a flat, or on a chute: front, depth, deposit, friction of the floor, and profiles of the velocity.
-
-The toe of the slope is the origin. s: distance along the floor, negative on the slope; n: height above it.
-"""
+"""Grains on a slope that ends on a flat, or on a chute: front, depth, deposit, friction of the floor, and profiles of the velocity. The toe
+of the slope is the origin. s: distance along the floor, negative on the slope; n: height above it."""
 
 from __future__ import annotations
 

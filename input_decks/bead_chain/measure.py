@@ -1,8 +1,6 @@
 """Bead chain: when the wave passes two contacts, and with which force."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -54,12 +52,7 @@ def measure(replicas: Replicas) -> Measurement:
 def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001 (there is one study)
     """Power of the force with which the speed grows."""
     points, _ = ordered(points, along)
-    force = np.array([_value(point, "peak_force") for point in points])
-    speed = np.array([_value(point, "velocity") for point in points])
+    force, speed = (np.array([measured(point, name).value for point in points]) for name in ("peak_force", "velocity"))
     growth = PowerLawFit(force, speed, 0.0 * speed)
     return Measurement({"force_exponent": Value(exact(fitted_exponent(force, speed)), exact(1.0 / 6.0))},
                        [growth.curve("speed", "Speed of the wave", "largest force (N)", "m/s", 1.0 / 6.0, "∝ F^(1/6)")])
-
-
-def _value(point: Mapping[str, Any], name: str) -> float:
-    return measured(point, name).value

@@ -1,8 +1,5 @@
-"""Column collapse: the energies that the engine's account booked, row by row, and the deposit.
-
-Energies are in J; works are positive when they make grains faster. Balances run over all rows of time.csv, shares over the collapse, from
-the row in which the gate begins to move.
-"""
+"""Column collapse: the energies that the engine's account booked, row by row, and the deposit. Energies are in J; works are positive when
+they make grains faster. Balances run over all rows of time.csv, shares over the collapse, from the row in which the gate begins to move."""
 
 from __future__ import annotations
 
@@ -56,13 +53,6 @@ class Collapse:
                   "kinetic": {"kinetic_energy": 1}, "gate": {"walls": -1}, "potential": {"potential_energy": -1}}
         return np.sum([sign * self.gained(column) for column, sign in takers.get(name, {name: -1}).items()], axis=0) / self.fallen
 
-    def imbalance(self) -> float:
-        """Largest difference between kinetic energy and the works of known forces, over the energy turned over so far.
-
-        What the account found besides, `other` and `imposed`, counts as unexplained: this case has neither.
-        """
-        return momentum.imbalance(self.rows, PARTS)
-
     def potential_error(self, column: str = "potential_energy") -> float:
         """Largest difference between gravity's work since the first row and the potential energy lost, over the largest such work."""
         work, energy = self.rows["gravity"] - self.rows["gravity"][0], self.rows[column]
@@ -71,14 +61,6 @@ class Collapse:
     def given_back(self) -> float:
         """Largest energy that a dissipating part gave from one row to the next, over the energy turned over; 0 when none ever did."""
         return float(max(np.diff(self.rows[name], prepend=0.0).max() for name in DISSIPATING) / self.rows["scale"][-1])
-
-    def step_error(self) -> float:
-        """Share that the step added to or took from the normal springs, the largest since the opening."""
-        return float(np.abs(self.gained("step_error")).max() / self.fallen)
-
-    def height(self) -> float:
-        """m, of the column: twice that of its centre of mass."""
-        return height(self.first)
 
     def front(self) -> float:
         """m, behind which a share FRONT of the mass lies at the end."""
@@ -89,10 +71,6 @@ class Collapse:
     def centre(self) -> Array:
         """Centre of mass (3,) of the deposit in m."""
         return np.average(self.last.positions, axis=0, weights=self.last.masses)
-
-    def height_at_wall(self) -> float:
-        """m, of the deposit: the highest grain within 2 d of the back wall."""
-        return float(surface(self.last, np.array([0.0, 2.0 * self.diameter]))[0])
 
 
 def read(replica: Replica) -> Collapse:
@@ -150,17 +128,18 @@ def measure(replicas: Replicas) -> Measurement:
         other = "the experiments used sand, sugar and rice between side walls, not rolling spheres"
         return Value(over(number), None if law is None else exact(law), reason="" if law is None else other)
 
-    aspect = over(lambda one: one.height() / one.width)
+    aspect = over(lambda one: height(one.first) / one.width)
     values = {
-        "energy_balance": worst(Collapse.imbalance),
+        "energy_balance": worst(lambda one: momentum.imbalance(one.rows, PARTS)),
         "potential_error": worst(Collapse.potential_error),
         "dissipation_sign": worst(Collapse.given_back),
-        "step_error": Value(over(Collapse.step_error)),
+        "step_error": Value(over(lambda one: float(np.abs(one.gained("step_error")).max() / one.fallen))),
         "height_error": Value(over(lambda one: one.potential_error("weight_height"))),
         **{f"{name}_share": share(name) for name in ways},
         "aspect_ratio": Value(aspect),
         "run_out": beside(lambda one: one.front() / one.width - 1.0, run_out_law(aspect.value)),
-        "final_height": beside(lambda one: one.height_at_wall() / one.width, height_law(aspect.value)),
+        "final_height": beside(lambda one: float(surface(one.last, np.array([0.0, 2.0 * one.diameter]))[0]) / one.width,
+                               height_law(aspect.value)),
         "mean_run_out": Value(over(lambda one: 2.0 * one.centre()[0] / one.width - 1.0)),
         "mean_height": Value(over(lambda one: 2.0 * one.centre()[2] / one.width)),
     }

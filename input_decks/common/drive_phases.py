@@ -1,12 +1,10 @@
-"""Frames of vibrated runs by the phase of the drive: eight a period, always at the same phases.
-
-A wall moves with the period T; frames are written every T/8, so that those of one phase show the bed as a stroboscope does, and what the
-grains do within a period cancels in their displacements from period to period.
-"""
+"""Frames of vibrated runs by the phase of the drive: eight a period, always at the same phases. A wall moves with the period T; frames are
+written every T/8, so that those of one phase show the bed as a stroboscope does, and what the grains do within a period cancels in their
+displacements from period to period."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,12 +35,6 @@ class Phases:
         """The frames at one phase, a period apart."""
         return [frame for frame, own in zip(self.frames, self.phases, strict=True) if own == phase % PHASES]
 
-    def mean(self, measure: Callable[[GrainFrame], Array]) -> Array:
-        """Mean of `measure(frame)`, an array of any shape, at each phase: (8, ...); NaN for a phase without frames."""
-        found = np.array([measure(frame) for frame in self.frames], float)
-        return np.stack([found[self.phases == phase].mean(axis=0) if (self.phases == phase).any() else np.full(found.shape[1:], np.nan)
-                         for phase in range(PHASES)])
-
     def displacements(self) -> Array:
         """Ways (pairs, grains, 3) in m of all grains in one period, from each frame that has another a period later."""
         places = np.array([frame.positions for frame in self.frames])
@@ -50,10 +42,8 @@ class Phases:
 
 
 def read_phases(frames: Iterable[GrainFrame], period_steps: int, time_step: float) -> Phases:
-    """`frames` of a drive with a period of `period_steps` steps of `time_step` (s).
-
-    DumpError when a frame is not at a multiple of an eighth of the period, when one is missing, or when grains come or go.
-    """
+    """`frames` of a drive with a period of `period_steps` steps of `time_step` (s). DumpError when a frame is not at a multiple of an
+    eighth of the period, when one is missing, or when grains come or go."""
     kept = list(frames)
     stride, rest = divmod(int(period_steps), PHASES)
     if not kept:
@@ -81,14 +71,3 @@ def binned(values: Array, places: Array, weights: Array, edges: Sequence[Array])
     sums = np.stack([np.histogramdd(places, bins=edges, weights=weights * column)[0] for column in columns], axis=-1)
     means = np.divide(sums, total[..., None], out=np.full(sums.shape, np.nan), where=total[..., None] > 0.0)
     return np.asarray(means if table.ndim > 1 else means[..., 0])
-
-
-def velocity_field(run: Phases, edges: Sequence[Array], axes: Sequence[int] = (0, 2)) -> Array:
-    """Drift (cells..., len(axes)) in m/s of the grains in cells between `edges` (m) along `axes`: displacement in a period over the
-    period, where each grain is in the middle of it, weighted by mass."""
-    ways = run.displacements()
-    middle = np.array([frame.positions for frame in run.frames])[:-PHASES] + 0.5 * ways
-    masses = np.broadcast_to(run.frames[0].masses, ways.shape[:2])
-    chosen = list(axes)
-    flat, place = (values[..., chosen].reshape(-1, len(chosen)) for values in (ways, middle))
-    return binned(flat / run.period, place, masses.ravel(), edges)

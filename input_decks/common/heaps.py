@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import linregress
 
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array
@@ -28,10 +29,7 @@ def surface(frame: GrainFrame, edges: Array) -> Array:
 
 def flank(frame: GrainFrame, low: float, high: float, diameter: float) -> float:
     """Inclination (degrees, positive where the surface falls along x) of the straight line through the surface in cells one `diameter`
-    wide, from x = 0 on, whose middles lie between `low` and `high` (m).
-
-    The highest grain of each cell counts, as in a silhouette.
-    """
+    wide, from x = 0 on, whose middles lie between `low` and `high` (m). The highest grain of each cell counts, as in a silhouette."""
     edges = diameter * np.arange(math.floor(low / diameter), math.ceil(high / diameter) + 1, dtype=np.float64)
     middles, tops = 0.5 * (edges[1:] + edges[:-1]), surface(frame, edges)
     chosen = (middles > low) & (middles < high)
@@ -73,11 +71,11 @@ def power_law(points: Sequence[tuple[float, float]], place: float | None = None)
     """Measured `points` (x, y) by the straight line through their logarithms: y at `place`, or the exponent when there is none, with the
     95 % interval that their scatter gives the line; inf for fewer than three points."""
     x, y = np.log(np.asarray(points, float)).T
-    slope, offset = np.polyfit(x, y, 1)
-    degrees, spread = len(x) - 2, float(((x - x.mean()) ** 2).sum())
-    scatter = math.sqrt(float(((y - slope * x - offset) ** 2).sum()) / degrees) if degrees > 0 else math.inf
-    basis = f"scatter of {len(x)} measured points"
+    if len(x) < 3:
+        slope, offset = np.polyfit(x, y, 1)
+        return Estimate(float(slope) if place is None else math.exp(slope * math.log(place) + offset), math.inf, "two points")
+    line, reach, basis = linregress(x, y), student(len(x) - 2), f"scatter of {len(x)} measured points"
     if place is None:
-        return Estimate(float(slope), student(degrees) * scatter / math.sqrt(spread), basis)
-    value, away = math.exp(slope * math.log(place) + offset), math.log(place) - float(x.mean())
-    return Estimate(value, value * student(degrees) * scatter * math.sqrt(1.0 / len(x) + away**2 / spread), basis)
+        return Estimate(float(line.slope), reach * float(line.stderr), basis)
+    away, value = math.log(place) - float(x.mean()), math.exp(line.slope * math.log(place) + line.intercept)
+    return Estimate(value, value * reach * float(line.stderr) * math.hypot(float(x.std()), away), basis)

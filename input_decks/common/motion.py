@@ -21,12 +21,10 @@ PLANES = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}
 
 def motion(p: Parameters, start: float | None = None, until: float | None = None, point: Sequence[float] = (0.0, 0.0, 0.0),
            folder: Path | None = None) -> WallMotion:
-    """The walls' motion from `start` to `until` (s; None: from the beginning, to the end; a table has an end of its own).
-
-    `point` (m) lies on the axis of rocking and rotation; `folder` has the file `motion.csv` of a table: that of the case in setup.py, that
-    of the run in measure.py. Raises ValueError with one line when this is no motion. In setup.py, `tables={"motion_words":
-    motion(p).words}` gives it to the decks.
-    """
+    """The walls' motion from `start` to `until` (s; None: from the beginning, to the end; a table has an end of its own). `point` (m) lies
+    on the axis of rocking and rotation; `folder` has the file `motion.csv` of a table: that of the case in setup.py, that of the run in
+    measure.py. Raises ValueError with one line when this is no motion. In setup.py, `tables={"motion_words": motion(p).words}` gives it to
+    the decks."""
     if p.motion == "table" and folder is None:
         raise DembarkError("motion = table is nothing that this case knows", "its walls move otherwise", "take another motion")
     window: list[Word] = [word for name, time in (("start", start), ("until", until)) if time is not None for word in (name, time)]

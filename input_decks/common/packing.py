@@ -97,11 +97,9 @@ def largest(p: Parameters) -> float:
 
 
 def grains(p: Parameters, sites: Array, box: object) -> Packing:
-    """p.grain_count grains on some of the `sites` (n, 3), chosen by the seed, each shifted by up to 0.05 d_max an axis.
-
-    Diameters are uniform within the spread about the mean. Grains do not touch when sites are 1.15 d_max apart.
-    DembarkError when there are fewer sites than grains.
-    """
+    """p.grain_count grains on some of the `sites` (n, 3), chosen by the seed, each shifted by up to 0.05 d_max an axis. Diameters are
+    uniform within the spread about the mean. Grains do not touch when sites are 1.15 d_max apart. DembarkError when there are fewer sites
+    than grains."""
     total, count = len(sites), p.grain_count
     if count > total:
         raise DembarkError(f"{count} grains have no room", f"the dilute column has {total} sites", "take fewer grains or a larger vessel")
@@ -123,15 +121,14 @@ def bodies(box: ArrayLike, positions: ArrayLike, radii: ArrayLike, masses: Array
     return Packing(np.asarray(box, float), np.asarray(positions, float), 2.0 * size, density, kinds, velocity, spin, type_count)
 
 
-def slab(p: Parameters, width: float, depth: float, margin: float, foot: float) -> tuple[Array, float]:
-    """Sites (n, 3) in m of a dilute column in a slab and its height (m): 0 < x < `width` less `margin` at both walls, period `depth` in y.
-
-    Cells are at least 1.15 d_max wide, 1.3 times more than grains, from z = `foot` on. With a shift of up to 0.05 d_max no two grains
-    touch, nor does one a wall that is 0.15 d_max or more away from the cells.
-    """
-    least = 1.15 * largest(p)
-    n_x, n_y = int((width - 2.0 * margin) / least), int(depth / least)
-    layers = int(np.ceil(1.3 * p.grain_count / (n_x * n_y)))
+def slab(p: Parameters, width: float, depth: float, margin: float, foot: float, rows: int = 0, size: float = 0.0) -> tuple[Array, float]:
+    """Sites (n, 3) in m of a dilute column in a slab and its height (m): 0 < x < `width` less `margin` at both walls, period `depth` in y,
+    in which there are `rows` (0: as many as fit), for grains up to the `size` (m; 0: d_max). Cells are at least 1.15 of that wide, 1.3
+    times more than grains, from z = `foot` on. With a shift of up to 0.05 d_max no two grains touch, nor does one a wall that is 0.15 d_max
+    or more away from the cells."""
+    least = 1.15 * (size or largest(p))
+    n_x, n_y = int((width - 2.0 * margin) / least), rows or int(depth / least)
+    layers = math.ceil(1.3 * p.grain_count / (n_x * n_y))
     cell = ((width - 2.0 * margin) / n_x, depth / n_y, least)
     return lattice((n_x, n_y, layers), cell, (margin, 0.0, foot)), layers * least
 

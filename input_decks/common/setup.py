@@ -16,11 +16,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Setup:
-    """What a deck needs beside the parameters of its case.
-
-    `steps` of `time_step` (s); `packing`: the bodies at the start; `numbers`: derived values by name, which the decks of all engines use;
-    `meshes`: triangles (n, 3, 3) in m by name, each written as <name>.stl; `tables`: rows of numbers by name, for decks alone.
-    """
+    """What a deck needs beside the parameters of its case. `steps` of `time_step` (s); `packing`: the bodies at the start; `numbers`:
+    derived values by name, which the decks of all engines use; `meshes`: triangles (n, 3, 3) in m by name, each written as <name>.stl;
+    `tables`: rows of numbers by name, for decks alone."""
 
     steps: int
     time_step: float
@@ -78,11 +76,8 @@ def rolling(p: Parameters) -> dict[str, Number]:
 
 
 def liquid(p: Parameters) -> dict[str, Number]:
-    """Whether there are bridges (`wet`) of liquid that grains carry (`carried`), and `reach` (m), which no bridge of a wall exceeds.
-
-    Walls look for grains within the skin only. The bound is generous: rupture is near (1 + angle/2) volume^(1/3) between grains, a
-    little later at a wall. A wall asks for half of a grain's liquid; foreseen is that the largest grain owns twice as much as at the start.
-    """
+    """Whether there are bridges (`wet`) of liquid that grains carry (`carried`), and `reach` (m), which no bridge of a wall exceeds: walls
+    look for grains within the skin only. Rupture is near (1 + angle/2) volume^(1/3); the largest grain may own twice its initial liquid."""
     content = getattr(p, "liquid_content", 0.0)
     volume = content * math.pi / 6.0 * largest(p) ** 3 if content > 0.0 else p.bridge_volume
     return {"wet": int(volume > 0.0), "carried": int(content > 0.0), "reach": 1.3 * (1.0 + 0.5 * p.contact_angle) * volume ** (1.0 / 3.0)}
@@ -102,10 +97,8 @@ def rectangle(corner: Sequence[float], first: Sequence[float], second: Sequence[
 
 
 def strip(corner: Sequence[float], along: Sequence[float], depth: float) -> Array:
-    """Triangles (n, 3, 3) in m of the rectangle at `corner` with the side `along` and the `depth` of a period along y.
-
-    In panels no longer than the period is deep, for LIGGGHTS cannot place elements that are much larger than the period.
-    """
+    """Triangles (n, 3, 3) in m of the rectangle at `corner` with the side `along` and the `depth` of a period along y. In panels no longer
+    than the period is deep, for LIGGGHTS cannot place elements that are much larger than the period."""
     panels = max(1, math.ceil(float(np.linalg.norm(along)) / depth))
     side = [length / panels for length in along]
     corners = ([x + length * k for x, length in zip(corner, side, strict=True)] for k in range(panels))

@@ -19,10 +19,8 @@ def highest_speed(p: Parameters) -> float:
 
 
 def impact(p: Parameters, speed: float) -> tuple[float, float]:
-    """Overlap (m) and duration (s) of the impact of two mean grains at `speed` (m/s): Hertz, without damping.
-
-    delta^(5/2) = 15 m* v^2 / (16 E* sqrt(R*)), T = 2.9433 delta / v; K. L. Johnson, Contact Mechanics (1985) section 11.4.
-    """
+    """Overlap (m) and duration (s) of the impact of two mean grains at `speed` (m/s): Hertz, without damping. delta^(5/2) = 15 m* v^2 / (16
+    E* sqrt(R*)), T = 2.9433 delta / v; K. L. Johnson, Contact Mechanics (1985) section 11.4."""
     radius = 0.5 * p.grain_diameter
     mass = 0.5 * p.grain_density * 4.0 / 3.0 * math.pi * radius**3
     modulus = 0.5 * p.youngs_modulus / (1.0 - p.poisson_ratio**2)
@@ -44,10 +42,8 @@ def suitable_step(p: Parameters, speed: float) -> float:
 
 def fixed_phases(frequency: float, time_step: float, start: float, periods: int, rows: int = 16) -> tuple[float, dict[str, Number]]:
     """Time step (s), at most `time_step`, of which a whole number makes a period of the drive with `frequency` (Hz); and output steps.
-
-    Frames from the end of period `start` (made up to a whole one) on to the end of `periods` more, eight a period and the first one;
-    `rows` rows of time.csv from one frame to the next, over the whole run. `period_steps` are the steps of a period.
-    """
+    Frames from the end of period `start` (made up to a whole one) on to the end of `periods` more, eight a period and the first one; `rows`
+    rows of time.csv from one frame to the next, over the whole run. `period_steps` are the steps of a period."""
     every = math.ceil(1.0 / (frequency * time_step * PHASES * rows))
     stride = every * rows
     period, begun = stride * PHASES, math.ceil(start)

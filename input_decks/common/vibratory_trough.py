@@ -1,7 +1,5 @@
-"""Vibrated troughs as a run wrote them: circulation of the bed, motion of a free part, force on the walls as noise.
-
-The bed lies in the plane y = 0; gravity points along -z. Turning is positive about y, from z to x, as the drive of positive sense goes.
-"""
+"""Vibrated troughs as a run wrote them: circulation of the bed, motion of a free part, force on the walls as noise. The bed lies in the
+plane y = 0; gravity points along -z. Turning is positive about y, from z to x, as the drive of positive sense goes."""
 
 from __future__ import annotations
 

@@ -43,12 +43,9 @@ def front(run: Replica) -> tuple[Array, Array]:
 
 
 def pace(own: tuple[Array, Array], source: str) -> tuple[Estimate, Estimate]:
-    """Speed of the front `own` over that measured, and the delay of the measured times T, each with the 95 % interval that the scatter of
-    the points leaves.
-
-    When the water was free is not known, so that a time alone says nothing. Times T of the experiment are a straight line over those of the
-    simulation at the same places: its slope is the speed, and the mean difference is the delay. Points count from T = 1 on.
-    """
+    """Speed of the front `own` over that measured, and the delay of the measured times T, with 95 % intervals by the scatter of the points.
+    The time at which the water was free is not known. Measured times T are fitted by a line over those of the simulation at the same
+    places: its slope is the speed, the mean difference the delay. Points count from T = 1 on."""
     times, fronts = published(source)
     counted = (times >= FREE) & (fronts <= own[1].max())
     if counted.sum() < FEWEST:
@@ -60,11 +57,8 @@ def pace(own: tuple[Array, Array], source: str) -> tuple[Estimate, Estimate]:
 
 
 def due(source: str, found: tuple[Estimate, Estimate]) -> tuple[Estimate, Estimate]:
-    """References of speed and delay, whose U_D is the scatter of the points.
-
-    The delay is between zero and the first entry of the table, when water had moved by a tenth of a. The later experiment contradicts the
-    earlier one, of a column of the same shape, which was done with columns of two sizes that agree: this is in its U_D of the speed.
-    """
+    """References of speed and delay; U_D: scatter of the points. The delay is between zero and the first entry of the table. The later
+    experiment contradicts the earlier one, of columns of two sizes that agree: its U_D of the speed includes the difference."""
     speed, delay = found
     contradiction = 0.0 if source == "martin_moyce" else abs(pace(published("martin_moyce"), source)[0].value - 1.0)
     return (Estimate(1.0, math.hypot(speed.half, contradiction), speed.basis),

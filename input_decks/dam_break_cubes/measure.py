@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
@@ -36,17 +37,10 @@ def published(cubes: str, axis: str) -> tuple[Array, Array]:
     return times, places
 
 
-def rotated(axes: Array, quaternion: Array) -> Array:
-    """Vectors (..., 3) in the frame of a body whose orientation is w, x, y, z, from space."""
-    w, v = quaternion[0], -quaternion[1:]
-    t = 2.0 * np.cross(v, axes)
-    return np.asarray(axes + w * t + np.cross(v, t))
-
-
-def pose(times: Mapping[str, Array], cube: int, row: int) -> tuple[Array, Array]:
+def pose(times: Mapping[str, Array], cube: int, row: int) -> tuple[Array, Rotation]:
     """Centre (m) and orientation of a cube, from 1 on, in a row of the history."""
     return (np.array([times[f"cube{cube}_{axis}"][row] for axis in "xyz"]),
-            np.array([times[f"cube{cube}_{part}"][row] for part in ("qw", "qx", "qy", "qz")]))
+            Rotation.from_quat([times[f"cube{cube}_q{part}"][row] for part in "xyzw"]))
 
 
 def outside(places: Array, velocities: Array, p: Mapping[str, Any], thick: float) -> tuple[Array, Array]:
@@ -82,7 +76,7 @@ def water(run: Replica) -> dict[str, float]:
         found["leaked"] = max(found["leaked"], float(through.sum() + run.derived["grain_count"] - len(frame.ids)))
         found["overtopped"] = max(found["overtopped"], float(over.sum()))
         poses = [pose(times, cube, row) for cube in range(1, count + 1)]
-        within = sum(int((np.abs(rotated(places - centre, turn)) < half - 0.5 * dx).all(axis=1).sum()) for centre, turn in poses)
+        within = sum(int((np.abs(turn.inv().apply(places - centre)) < half - 0.5 * dx).all(axis=1).sum()) for centre, turn in poses)
         found["inside"] = max(found["inside"], float(within))
         if p["arrangement"] == "six" and FLOW[0] <= now <= FLOW[1]:
             found["gap_filled"] = float(np.fmax(found["gap_filled"], filled(places, [centre for centre, _ in poses[:3]], half, dx)))

@@ -1,8 +1,5 @@
-"""A drum with logs: impacts, forces and energy in the measuring window, a whole number of revolutions.
-
-A contact counts as an impact when it begins with at least the speed of approach `impact_speed`; slower ones are logs that rest or roll on
-each other, which lose energy in no single place.
-"""
+"""A drum with logs: impacts, forces and energy in the measuring window, full revolutions. A contact that begins with the speed of approach
+`impact_speed` or more is an impact; slower ones are logs that rest or roll on each other."""
 
 from __future__ import annotations
 

@@ -1,10 +1,6 @@
-"""Debarking drum: how many impacts logs get in a revolution, how hard they are, and whether the energy balances.
-
-Everything is taken per revolution of the measuring window, and per log where that makes drums of different size comparable. What must hold
-whatever the logs do: the certificate of the contact problem in every step; the energy that the shell brings in (its moment times its
-speed) is what is stored plus what is lost; over many revolutions what is stored does not grow, so the drum's power is the power that is
-lost; and the mean force of the shell is the weight.
-"""
+"""Debarking drum: impacts per revolution of the measuring window and per log, their forces, and checks that hold for any motion:
+certificate of the contact problem, balance of energy, power of the drum against the power dissipated, mean force of the shell against the
+weight."""
 
 import math
 

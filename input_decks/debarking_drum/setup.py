@@ -13,10 +13,8 @@ ROWS = 200
 
 
 def setup(p: Parameters) -> Setup:
-    """Diameters are the middles of n equal parts of their range: the same set for every seed, so that the filling is met exactly.
-
-    Places are a lattice of triangles, a little wider than the thickest log; the seed says which log has which diameter.
-    """
+    """Diameters are the middles of n equal parts of their range: the same set for every seed, so that the filling is met exactly. Places
+    are a lattice of triangles, a little wider than the thickest log; the seed says which log has which diameter."""
     mean, span = 0.5 * (p.log_diameter_min + p.log_diameter_max), p.log_diameter_max - p.log_diameter_min
     n, square = p.logs, mean**2 + span**2 / 12.0 * (1.0 - 1.0 / p.logs**2)
     radius = 0.5 * math.sqrt(n * square / p.filling) if p.drum_radius is None else p.drum_radius

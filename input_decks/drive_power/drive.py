@@ -1,8 +1,6 @@
-"""A bed on a plate that shakes, as a run wrote it: power of the drive, time in flight, rise of its centre, how soon both are steady.
-
-Energies in J; works on the grains are positive. With the amplitude A and the angular frequency w of the plate V = A w is its highest
-speed, G = A w^2 / g its acceleration, and p = P / (M g V) the power P of the drive on a bed of the mass M.
-"""
+"""A bed on a plate that shakes: power of the drive, time in flight, rise of its centre, time until both are steady. Energies in J; works on
+the grains are positive. Amplitude A and angular frequency w of the plate: V = A w, G = A w^2 / g, p = P / (M g V) for a bed of the mass
+M."""
 
 from __future__ import annotations
 
@@ -39,12 +37,9 @@ class Block:
 
 
 def sticking_block(acceleration: float) -> Block | None:
-    """The steady motion on a plate A sin(wt) with A w^2 = `acceleration` g, one flight a period; None below 1, where nothing flies, and
-    from sqrt(1 + pi^2) on, where a flight lasts longer than a period.
-
-    It leaves the plate at sin(phase) = 1 / `acceleration` and falls freely until the plate meets it. Each landing takes what the plate has
-    given: M u^2 / 2 with the relative speed u.
-    """
+    """The steady motion on a plate A sin(wt), A w^2 = `acceleration` g, one flight a period; None below 1 and from sqrt(1 + pi^2) on, where
+    a flight lasts longer. It leaves at sin(phase) = 1 / `acceleration`, falls freely, and loses M u^2 / 2 on landing with the relative
+    speed u."""
     if not 1.0 < acceleration < LONGEST:
         return None
     start = math.asin(1.0 / acceleration)
@@ -74,22 +69,13 @@ class Drive:
     period: float
     speed: float
 
-    def _by_period(self, work: Array) -> Array:
-        """Gain of a column in each period (periods,)."""
-        return np.asarray(np.diff(work[self.ends]))
-
-    @property
-    def window(self) -> slice:
-        """Rows of the measuring window."""
-        return slice(int(self.ends[self.steady]) + 1, int(self.ends[-1]) + 1)
-
     def gained(self, name: str) -> float:
         """Gain of a column in the measuring window."""
         return float(self.rows[name][self.ends[-1]] - self.rows[name][self.ends[self.steady]])
 
     def powers(self, name: str = "walls") -> Array:
         """Mean power (periods,) in each period over M g V, from the account's work of the walls or from that of the force on the plate."""
-        return self._by_period(self.rows[name]) / (self.period * self.weight * self.speed)
+        return np.diff(self.rows[name][self.ends]) / (self.period * self.weight * self.speed)
 
     def power(self, name: str = "walls") -> Estimate:
         """Its mean in the measuring window."""
@@ -99,13 +85,9 @@ class Drive:
         """Work of the plate's force times its velocity over that in the account, less 1."""
         return self.gained("plate_work") / self.gained("walls") - 1.0
 
-    def dissipated(self) -> float:
-        """J that contacts have taken in the window and do not hold."""
-        return -sum(self.gained(name) for name in (*CONTACT_PARTS, *STORED))
-
     def dissipation_gap(self) -> float:
-        """Work of the walls over what was dissipated, less 1."""
-        return self.gained("walls") / self.dissipated() - 1.0
+        """Work of the walls over what contacts have taken in the window and do not hold, less 1."""
+        return self.gained("walls") / -sum(self.gained(name) for name in (*CONTACT_PARTS, *STORED)) - 1.0
 
     def flight(self) -> Estimate:
         """Share of the time in which the force on the plate is below FLIGHT of the weight."""
@@ -149,10 +131,6 @@ class Drive:
         """Periods until the rise is."""
         return self.reached(self._means(self.heights()))
 
-    def over_phase(self, name: str) -> Array:
-        """Mean (rows a period,) of a column over the periods of the window, at the phases k / rows, k = 1 ..."""
-        return np.asarray(self.rows[name][self.window].reshape(len(self.ends) - 1 - self.steady, -1).mean(axis=0))
-
 
 def read(replica: Replica) -> Drive:
     """What was written; DumpError when the rows of time.csv do not make whole periods."""
@@ -179,7 +157,8 @@ def transients(runs: list[Drive]) -> list[Curve]:
 
 def phases(runs: list[Drive], block: Block | None) -> Curve:
     """Curve of the force on the plate over the phase; reference: none while the sticking block of this acceleration flies."""
-    forces = [one.over_phase("plate_fz") / one.weight for one in runs]
+    forces = [one.rows["plate_fz"][one.ends[one.steady] + 1 : one.ends[-1] + 1].reshape(len(one.ends) - 1 - one.steady, -1).mean(axis=0)
+              / one.weight for one in runs]
     phase: Any = (np.arange(len(forces[0])) + 1.0) / len(forces[0])
     note = "" if block is None else f"a block that sticks where it lands would be in flight for {block.flight:.3f} of the period"
     return profile("force", "Force on the plate over the phase", "phase of the drive (periods)", "F / (M g)", phase, forces, note=note)

@@ -20,7 +20,7 @@ def setup(p: Parameters) -> Setup:
     period, held = numbers["period_steps"], numbers["steps"]
     if p.rest_periods:
         numbers["steps"] = held + (math.ceil(p.motion_ramp) + p.rest_periods) * period
-    sites, height = bed(p, d_max)
+    sites, height = packing.slab(p, p.cell_width, p.cell_depth, margin=0.0, foot=0.15 * d_max, rows=p.dimensions == 2)
     box = [(0.0, p.cell_width), (0.0, p.cell_depth), (-amplitude(p) - 2.0 * d_max, height + p.headroom)]
     grains = packing.grains(p, sites, box)
     if p.dimensions == 2:
@@ -29,11 +29,3 @@ def setup(p: Parameters) -> Setup:
     more = {"begin": still * period, "held": held}
     return Setup(numbers["steps"], step, grains, {**numbers, **more, **contacts(p, skin=0.2)}, {"plate": plate},
                  {"motion_words": moving.words})
-
-
-def bed(p: Parameters, d_max: float) -> tuple[packing.Array, float]:
-    """Sites (n, 3) in m of a dilute bed above z = 0, and its height (m); those of a plane have one row."""
-    least = 1.15 * d_max
-    n_x, n_y = int(p.cell_width / least), int(p.cell_depth / least) if p.dimensions == 3 else 1
-    layers = math.ceil(1.3 * p.grain_count / (n_x * n_y))
-    return packing.lattice((n_x, n_y, layers), (p.cell_width / n_x, p.cell_depth / n_y, least), (0.0, 0.0, 0.15 * d_max)), layers * least

@@ -1,12 +1,7 @@
-"""Granular collapse: run-out and height of the deposit compared with experiments with glass beads, and their exponents in a = H/W.
-
-Columns of few grains run out less far: the deposit ends where it is half a layer thin, and that is a length in grains. So run-out and
-height of three widths of the column are carried on along d/W, in which they are linear, to columns as wide as those of the experiments.
-
-V&V 20: the error E = S − D of this value S against the datum D is known within U_val, U_val² = U_sim² + U_size² + U_input² + U_D²: the
-interval of S over packings, what the unknown width of the measured columns leaves open, `input_uncertainty` of case.toml, and the
-interval of the line through the measured points near a.
-"""
+"""Granular collapse: run-out and height of the deposit compared with experiments with glass beads, and their exponents in a = H/W. Columns
+of few grains run out less far, since the deposit ends where it is half a layer thin: run-out and height of three widths are extrapolated
+along d/W, in which they are linear. V&V 20: E = S − D is known within U_val, U_val² = U_sim² + U_size² + U_input² + U_D²: packings, unknown
+width of the measured columns, `input_uncertainty`, and the line through the measured points near a."""
 
 import math
 from pathlib import Path

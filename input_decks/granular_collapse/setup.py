@@ -9,10 +9,8 @@ from dembark.input_decks.common.setup import Parameters, Setup, contacts, rows_a
 
 
 def setup(p: Parameters) -> Setup:
-    """The gate leaves at the first frame and stops at the far end of the floor; 20 rows of time.csv between two frames.
-
-    The level of the floor, z = 0, is that of the tops of the glued grains in the mean.
-    """
+    """The gate leaves at the first frame and stops at the far end of the floor; 20 rows of time.csv between two frames. The level of the
+    floor, z = 0, is that of the tops of the glued grains in the mean."""
     step, d, d_max = time_step(p), p.grain_diameter, packing.largest(p)
     fall = math.sqrt(p.aspect_ratio * p.column_width / p.gravity)
     output = rows_and_frames(step, p.settle_time * fall, p.collapse_time * fall, p.frames)

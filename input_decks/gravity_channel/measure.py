@@ -1,10 +1,6 @@
 """Gravity-driven channel: grains fall between two flat frictional walls, periodic along the flow, at a given mean solid fraction.
-
-Velocities are shown over sqrt(g W). What falls steadily is held by the walls' friction: mean(left + right) = weight, and while the mean
-velocity u still changes, weight times 1 - (du/dt) / g. The velocity at the wall is that of the layer within one diameter, the greatest
-velocity the mean over the middle half; the thickness of the shear zones is the length of the exponential that fits what is missing to the
-latter, in cells of one diameter. The studies ask how these grow with the width.
-"""
+Velocities over sqrt(g W): at the wall, of the layer within one diameter; the greatest, mean over the middle half. Balance: mean(left +
+right) = weight (1 - (du/dt) / g). Thickness of the shear zones: length of the exponential fitted to u_max - u in cells of one diameter."""
 
 from __future__ import annotations
 
@@ -69,13 +65,6 @@ def profiles(channels: Sequence[Channel]) -> list[Curve]:
     ]
 
 
-def scaled_curves(curves: Sequence[tuple[Array, Array]], widths: Array, amplitude: float) -> list[Curve]:
-    """The scaled profiles `curves` of channels of `widths` (in d), each beside `amplitude` exp(-place)."""
-    return [profile(f"scaled_velocity_{width:.0f}", f"Scaled velocity deficit, W = {width:.0f} d", *SCALED, place, [value],
-                    reference=amplitude * np.exp(-place), reference_label="one exponential for all widths")
-            for (place, value), width in zip(curves, widths, strict=True)]
-
-
 def measure(replicas: Replicas) -> Measurement:
     """Values, profiles and remarks of all replicas of a series."""
     channels = [read_periodic(replica) for replica in replicas]
@@ -118,7 +107,9 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     }
     curves = [grown[name].curve(name, title, "width W / d", label, power, "proportional to " + ("√W" if power == 0.5 else "W"))
               for name, (title, label, power) in GROWN.items()]
-    curves += scaled_curves(scaled, cells, amplitude)
+    curves += [profile(f"scaled_velocity_{width:.0f}", f"Scaled velocity deficit, W = {width:.0f} d", *SCALED, place, [value],
+                       reference=amplitude * np.exp(-place), reference_label="one exponential for all widths")
+               for (place, value), width in zip(scaled, cells, strict=True)]
     core, wall = (PowerLawFit.of(points, name, cells).values for name in ("solid_fraction", "wall_solid_fraction"))
     loose = ", ".join(f"{one:.3f} and {other:.3f} at {width:.0f} d" for one, other, width in zip(core, wall, cells, strict=True))
     return Measurement(values, curves, [

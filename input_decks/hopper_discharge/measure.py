@@ -1,8 +1,5 @@
-"""Discharge of a bin: discharged mass against time, compared with a published curve, and the law of Beverloo in the width of the slot.
-
-Times are counted from the moment at which 10 % of the mass have left: published curves do not say how their gate opens. V&V 20: the error
-E = S − D is known within U_val, U_val² = U_num² + U_input² + U_D²; studies of friction and stiffness find U_input and U_num.
-"""
+"""Discharge of a bin: discharged mass against time, compared with a published curve, and the law of Beverloo. Times count from 10 % of the
+mass on: published curves do not say how their gate opens. V&V 20: E = S − D is known within U_val, U_val² = U_num² + U_input² + U_D²."""
 
 import math
 from collections.abc import Sequence
@@ -14,19 +11,8 @@ import numpy as np
 from dembark.input_decks.common.estimates import reference_rows, values_and_halves
 from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.history import reached
-from dembark.postproc.measurement import (
-    Array,
-    Curve,
-    Estimate,
-    Measurement,
-    Points,
-    Replica,
-    Replicas,
-    Value,
-    exact,
-    over_replicas,
-    profile,
-)
+from dembark.postproc.measurement import Curve, Estimate, Measurement, Points, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.replica import Array, Replica
 from dembark.postproc.studies import compared, fitted_exponent, measured, propagated
 
 PUBLISHED = Path(__file__).with_name("reference") / "anand_2008.csv"
@@ -117,7 +103,8 @@ def measure(replicas: Replicas) -> Measurement:
               "bulk_density": Value(over_replicas([Estimate(run.density, math.inf, "one frame") for run in runs])),
               "fill_height": Value(exact(runs[0].height / given["outlet_width"]))}
     if not known:
-        return Measurement(values, [_plain(runs)])
+        place = runs[0].shifted()
+        return Measurement(values, [profile("discharge", *TITLES, place, _mean(runs, place))])
     due = datum()
     worst = max((_difference(runs, name) for name in published()), key=lambda one: one.value)
     values |= {"rate": Value(rate, due["rate"], detail=compared(rate.value, due["rate"], sim=rate.half, num=0.0, input=0.0).text),
@@ -148,10 +135,6 @@ def _beside(runs: Sequence[Discharge], name: str) -> Curve:
     t, y = t[t > first], y[t > first]
     return profile(f"discharge_{name}", *TITLES, t, _mean(runs, t), reference=y, reference_half=np.full(len(y), READ),
                    reference_label="Anand et al. (2008), DEM")
-
-
-def _plain(runs: Sequence[Discharge]) -> Curve:
-    return profile("discharge", *TITLES, runs[0].shifted(), _mean(runs, runs[0].shifted()))
 
 
 def study(name: str, points: Points, along: str) -> Measurement:

@@ -1,7 +1,5 @@
-"""Liquid exchange: the liquid of each grain, the wall and the bridges against the rule on the prescribed paths, to round-off.
-
-The reference follows from the parameters alone, so that the set-up of the decks is checked, too.
-"""
+"""Liquid exchange: the liquid of each grain, the wall and the bridges against the rule on the prescribed paths, to round-off. The reference
+follows from the parameters alone, so that the set-up of the decks is checked, too."""
 
 import math
 

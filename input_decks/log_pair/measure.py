@@ -1,9 +1,6 @@
-"""Log pair: one impact against the exact motion of the two bodies; in the studies, the order of convergence.
-
-A scheme with the step tau and the weight theta parts the logs with e = exp(-pi (2 theta - 1) omega tau / 2) of the exact speed. What the
-phase of the touch within a step adds is at most (omega tau)^2 / 8 of the speed and 3 (omega tau)^2 / 8 of the peak force (found by running
-the scheme's own recursion over all phases); twice that is allowed.
-"""
+"""Log pair: one impact against the exact motion of two bodies; order of convergence in the studies. A scheme with the step tau and the
+weight theta has a restitution e = exp(-pi (2 theta - 1) omega tau / 2). The phase of the touch within a step changes the speed by (omega
+tau)^2 / 8 and the peak force by 3 (omega tau)^2 / 8 at most (found with the scheme's recursion over all phases); twice that is allowed."""
 
 import math
 from dataclasses import replace

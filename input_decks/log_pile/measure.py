@@ -20,11 +20,9 @@ FIRST = 10  # impacts from the beginning in which two engines have to be the sam
 
 @dataclass(frozen=True)
 class Loads:
-    """What contacts carry in all frames, in N, along x and y.
-
-    `walls` (frames, walls, 2): force of each wall on the logs; `net` (frames, n, 2): sum of the contact forces on each log; `contacts`
-    (frames,): how many carry; `mobilised` (frames,): mean of |T| / N, NaN without contacts.
-    """
+    """What contacts carry in all frames, in N, along x and y. `walls` (frames, walls, 2): force of each wall on the logs; `net` (frames, n,
+    2): sum of the contact forces on each log; `contacts` (frames,): how many carry; `mobilised` (frames,): mean of |T| / N, NaN without
+    contacts."""
 
     walls: Array
     net: Array
@@ -59,10 +57,8 @@ def beginning(run: LogRun, count: int) -> tuple[int, NDArray[np.int64], Array]:
 
 def impact_values(runs: Sequence[LogRun]) -> dict[str, Value]:
     """How many impacts a pile had, the geometric mean of their peak forces and the median of their impulses, with Student's intervals over
-    the piles; nothing where one of them had fewer than two.
-
-    Impacts come in cascades, each the cause of the next ones: as independent ones they would have intervals that are far too narrow.
-    """
+    the piles; nothing where one of them had fewer than two. Impacts come in cascades, each the cause of the next ones: as independent ones
+    they would have intervals that are far too narrow."""
     found = [run.impacts for run in runs]
     if min(map(len, found)) < 2:
         return {}

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from dembark.input_decks.common.motion import amplitude, motion
 from dembark.physics import effective_youngs_modulus
@@ -73,10 +73,7 @@ def landings(count: int, place: Callable[[float], float], velocity: Callable[[fl
         high = since + 1e-5
         while above(high) > 0.0:
             high += 1e-5
-        low = high - 1e-5
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if above(middle) > 0.0 else (low, middle)
+        high = brentq(above, high - 1e-5, high, xtol=1e-16)
         hits = velocity(high) - speed + gravity * (high - since)
         found.append((high, hits))
         since = high + contact.duration(hits)
@@ -168,11 +165,8 @@ def _curve(name: str, title: str, times: Array, found: Array, due: Array, unit: 
 
 def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001 (there is one study)
     """Forces in moving vessels against those in vessels at rest."""
-    forces = {point["parameters"][along]: _forces(point) for point in points}
+    forces = {point["parameters"][along]: np.array(next(one["value"] for one in point["profiles"] if one["name"] == "forces"))
+              for point in points}
     pairs = {"speed_error": ("speed", "rest"), "push_error": ("push", "tilt")}
     return Measurement({found: Value(exact(float(np.abs(forces[one] - forces[other]).max() / np.abs(forces[other]).max())), exact(0.0))
                         for found, (one, other) in pairs.items()})
-
-
-def _forces(point: Mapping[str, Any]) -> Array:
-    return np.array(next(one["value"] for one in point["profiles"] if one["name"] == "forces"))

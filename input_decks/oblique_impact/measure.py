@@ -1,8 +1,5 @@
-"""Oblique impact: the motion of each sphere after it, compared with the measurement.
-
-V&V 20: the error E = S − D of a simulated value S against the datum D is known within U_val, U_val² = U_num² + U_input² + U_D². A run knows
-U_input, from spheres with changed inputs; the study of three time steps adds U_num and the datum, and has the verdicts.
-"""
+"""Oblique impact: the motion of each sphere after it, compared with the measurement. V&V 20: E = S − D is known within U_val, U_val² =
+U_num² + U_input² + U_D². A run has U_input, by spheres with changed inputs; the study of three time steps adds U_num and U_D and judges."""
 
 from __future__ import annotations
 
@@ -61,22 +58,17 @@ class Datum:
 
 
 def misclosure(rows: Sequence[Mapping[str, Any]]) -> Array:
-    """(2/5) R ω − v sin α (1 − e_t) in m/s at each angle at which ω was measured; e_t between its own angles by a monotone cubic.
-
-    Friction is the only force with a moment about the centre, so that this is zero for a rigid sphere under any contact law: what is
-    left is the error of the measurement.
-    """
+    """(2/5) R ω − v sin α (1 − e_t) in m/s at each angle at which ω was measured; e_t between its own angles by a monotone cubic. Friction
+    is the only force with a moment about the centre, so that this is zero for a rigid sphere under any contact law: what is left is the
+    error of the measurement."""
     (angles, kept), (at, spins) = (np.array([(row["angle"], row["value"]) for row in rows if row["quantity"] == name]).T
                                    for name in ("tangential_restitution", "spin"))
     return 0.4 * RADIUS * spins - SPEED * np.sin(np.radians(at)) * (1.0 - PchipInterpolator(angles, kept)(at))
 
 
 def measured() -> list[Datum]:
-    """The measured points.
-
-    U_D of e_t and spin comes from their misclosure, a velocity: its mean may lie in either of the two, so that both have all of it as a
-    common part; its scatter about the mean is shared, half of the variance in each. U_D of the angles is that of the file, common to all.
-    """
+    """The measured points. U_D of e_t and spin comes from their misclosure, a velocity: its mean is a common part of both; its scatter is
+    shared, half of the variance in each. U_D of the angles is that of the file, common to all."""
     rows = [{key: text if key == "quantity" else float(text or 0.0) for key, text in row.items()} for row in reference_rows(MEASURED)]
     open_by = misclosure(rows)
     common, scatter = abs(float(open_by.mean())), student(len(open_by) - 1) * float(open_by.std(ddof=1)) / math.sqrt(2.0)
@@ -162,13 +154,10 @@ def _alone(one: Point) -> Value:
 
 
 def _together(points: Sequence[Point], relative: bool = False) -> Value:
-    """The root mean square of E over `points`, from which the scatter of the data is taken out; `relative`: over the mean of the data.
-
-    Points count with the inverse squares of U_D. With the mean and the variance of E, and the variance s² of the scatter of the data, it
-    is (mean² + max(0, variance − s²))^½, as in the random-effects model of R. DerSimonian and N. Laird, Control. Clin. Trials 7 (1986) 177.
-    It is never below the mean, so that nothing passes by cancelling. Its U_val is that of the mean. Only scatter is the less the more
-    points there are; common parts of U_D, inputs and steps count as if they acted on all points alike.
-    """
+    """The root mean square of E over `points`, without the scatter of the data; `relative`: over the mean of the data. Points are weighted
+    by the inverse squares of U_D; with the variance s² of the scatter it is (mean² + max(0, variance − s²))^½, as in the random-effects
+    model of R. DerSimonian and N. Laird, Control. Clin. Trials 7 (1986) 177; never below the mean, so that nothing cancels. U_val is that
+    of the mean: scatter falls with the number of points; common parts of U_D, inputs and steps act on all points alike."""
     errors, values, scatter, common, inputs, steps = np.array([
         (one.value - one.datum.value, one.datum.value, one.datum.scatter, one.datum.common, one.inputs, one.steps) for one in points]).T
     weights = 1.0 / (scatter**2 + common**2)

@@ -1,8 +1,6 @@
-"""Plane silo: the silo's quantities for a packing between two walls a distance W apart, periodic in the third direction.
-
-The walls have the area 2 dz for each W dz of the slab, a cylinder's 2 pi R dz for each pi R^2 dz: Janssen's balance is the same with W in
-R's place, lambda = W / (2 K mu_mob). K is the mean normal stress of both walls over the mean sigma_zz of the cross-section W x period.
-"""
+"""Plane silo: the silo's quantities for a packing between two walls a distance W apart, periodic in the third direction. The walls have the
+area 2 dz for each W dz of the slab, a cylinder's 2 pi R dz for each pi R^2 dz: Janssen's balance is the same with W in R's place, lambda =
+W / (2 K mu_mob). K is the mean normal stress of both walls over the mean sigma_zz of the cross-section W x period."""
 
 from dataclasses import replace
 

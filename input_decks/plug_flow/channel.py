@@ -1,9 +1,6 @@
-"""A flow in a channel between two walls as measured: velocities and stresses over cells across it and bands of height, steady part.
-
-x runs from wall to wall, 0 to W, the planes of the walls; y is periodic, gravity points along -z, velocities are counted downward. The
-first layer's centres are half a diameter inside; grains that are glued to a rough wall stand on these planes. Eulerian means weigh each
-grain by its exact volume in the cell, Lagrangian ones are displacements of single grains.
-"""
+"""A flow in a channel between two walls: velocities and stresses over cells across it and bands of height, steady part. x runs from wall to
+wall, 0 to W; y is periodic, gravity points along -z, velocities are counted downward. Grains glued to a rough wall stand on its plane.
+Eulerian means weigh each grain by its exact volume in the cell, Lagrangian ones are displacements of single grains."""
 
 from __future__ import annotations
 
@@ -44,13 +41,10 @@ def fitted_decay(place: Array, deficit: Array, start: float) -> float:
 
 @dataclass(frozen=True)
 class Channel:
-    """One replica, steady part: arrays over frames, cells across (x) and bands of height (z), in SI units.
-
-    `speed` (m/s): the scale of velocities. `solid` (m3), `flow` = sum V v (m4/s), `flow2` = sum V v^2 are (frames, cells, bands);
-    `pressure` (frames, cells); `grain_place`, `grain_speed` (grains,): mean x (m) and Lagrangian velocity (m/s); `core_motion`: that of the
-    core from frame to frame; `normal`, `shear` (frames, bands, 2): stresses (Pa) of the left and right wall. `remark`: why it is not
-    steady, or ''.
-    """
+    """One replica, steady part: arrays over frames, cells across (x) and bands of height (z), in SI units. `speed` (m/s): the scale of
+    velocities. `solid` (m3), `flow` = sum V v (m4/s), `flow2` = sum V v^2 are (frames, cells, bands); `pressure` (frames, cells);
+    `grain_place`, `grain_speed` (grains,): mean x (m) and Lagrangian velocity (m/s); `core_motion`: that of the core from frame to frame;
+    `normal`, `shear` (frames, bands, 2): stresses (Pa) of the left and right wall. `remark`: why it is not steady, or ''."""
 
     edges: Array
     levels: Array
@@ -121,10 +115,8 @@ class Channel:
         return float(np.abs(self.velocity(frames, bands, 2)[core] / self.core_velocity(frames, bands) - 1.0).max())
 
     def deficit(self, frames: Mask, bands: Bands = ALL, cells: int = 1) -> tuple[Array, Array]:
-        """Distance from the nearer wall (m) and 1 - v / v_core there, both walls averaged; without cells that hold hardly a grain.
-
-        With two `cells` taken together they are one diameter wide: smaller ones show the same grain's velocity at several places.
-        """
+        """Distance from the nearer wall (m) and 1 - v / v_core there, both walls averaged; without cells that hold hardly a grain. With two
+        `cells` taken together they are one diameter wide: smaller ones show the same grain's velocity at several places."""
         flow, solid = self.sums(frames, bands, cells)
         half, edges = len(flow) // 2, self.edges[::cells]
         flow, solid = flow[:half] + flow[::-1][:half], solid[:half] + solid[::-1][:half]
@@ -137,10 +129,8 @@ class Channel:
         return min(fitted_decay(*self.deficit(frames, bands, cells), start * self.diameter), self.width) / self.diameter
 
     def scaled_deficit(self, length: float) -> tuple[Array, Array]:
-        """Distance from the layer at the nearer wall over `length` (d), and (v_core - v) / (v_core - v_wall) there; 1 at 0.
-
-        The layer's centres are half a diameter off the wall, and its velocity is that of the wall.
-        """
+        """Distance from the layer at the nearer wall over `length` (d), and (v_core - v) / (v_core - v_wall) there; 1 at 0. The layer's
+        centres are half a diameter off the wall, and its velocity is that of the wall."""
         place, deficit = self.deficit(self.frames, cells=2)
         return (place - place[0]) / (length * self.diameter), deficit / (1.0 - self.wall_velocity(self.frames))
 
@@ -179,10 +169,8 @@ class Channel:
         return float(self.inertial_numbers(frames)[np.minimum(place, self.width - place) > self.diameter].max())
 
     def fluctuation(self, frames: Mask, bands: Bands = ALL, apart: bool = False) -> Array:
-        """Standard deviation (cells,) of the vertical velocities about the cell's mean, over the scale of velocities.
-
-        `apart`: without what all grains do together from frame to frame, which is no agitation.
-        """
+        """Standard deviation (cells,) of the vertical velocities about the cell's mean, over the scale of velocities. `apart`: without what
+        all grains do together from frame to frame, which is no agitation."""
         solid, flow, flow2 = (values[frames][:, :, bands].sum(axis=2) for values in (self.solid, self.flow, self.flow2))
         common = (flow.sum(axis=1) / solid.sum(axis=1))[:, None] if apart else 0.0
         mean = _ratio((flow - common * solid).sum(axis=0), solid.sum(axis=0))
@@ -253,11 +241,9 @@ def read(replica: Replica) -> Channel:
 
 @once
 def read_periodic(replica: Replica) -> Channel:
-    """Measure a run whose grains fall between the walls, periodic along the flow; the scale of velocities is sqrt(g W).
-
-    The walls' friction swings by as much as its mean, so the steady part is that of the kinetic energy, which sums up what the balance of
-    forces lacks. The balance is that of friction, weight and the mean acceleration from frame to frame.
-    """
+    """Measure a run whose grains fall between the walls, periodic along the flow; the scale of velocities is sqrt(g W). The walls' friction
+    swings by as much as its mean, so the steady part is that of the kinetic energy, which sums up what the balance of forces lacks. The
+    balance is that of friction, weight and the mean acceleration from frame to frame."""
     given, times, steps = replica.parameters, replica.times(), np.array([frame.step for frame in replica.grains()])
     gravity, width, depth = (float(given[name]) for name in ("gravity", "channel_width", "channel_depth"))
     window = times["step"] > 2 * steps[0] - steps[1]
@@ -284,9 +270,7 @@ Measure = Callable[[Mask, Bands], float]
 
 def estimates(one: Channel, series: Array, more: Mapping[str, Measure], apart: bool = False) -> dict[str, Estimate]:
     """What is measured of any channel, by name, and `more`; intervals are from time blocks of `series` (frames,), and from the bands.
-
-    `apart`: fluctuations without what all grains do together, see `Channel.fluctuation`.
-    """
+    `apart`: fluctuations without what all grains do together, see `Channel.fluctuation`."""
     near, bands = one.from_wall < one.diameter, one.solid.shape[2]
     measures: dict[str, Measure] = {
         "core_flatness": one.flatness,

@@ -1,8 +1,5 @@
-"""Fields of the plug flow over the channel's width and height, coarse-grained in the cells that rest in the laboratory, steady part.
-
-The mean velocity of a cell is Eulerian: the momentum that was found in it over all frames, over the mass. Beside it stands the Lagrangian
-one, displacements of single grains over the same time. The flow is uniform along the walls, so the two must agree.
-"""
+"""Fields of the plug flow over width and height of the channel, coarse-grained in cells at rest, steady part. Eulerian velocity: momentum
+over mass of a cell. Lagrangian: displacements of grains over the same time. The flow is uniform along the walls, so that both agree."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
-"""Plug flow: a packing sinks between two vertical walls on a plate that moves down at the constant speed v0.
-
-Only the steady part is used; it is detected in the wall friction (MSER-5 and a drift test).
-"""
+"""Plug flow: a packing sinks between two vertical walls on a plate that moves down at the constant speed v0. Only the steady part is used;
+it is detected in the wall friction (MSER-5 and a drift test)."""
 
 from __future__ import annotations
 

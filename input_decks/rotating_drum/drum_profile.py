@@ -1,8 +1,6 @@
-"""Grains in a turning drum as measured: the free surface, and the speed along it on its normal through the axis.
-
-The axis of the drum is z, gravity points along -y, and the drum turns anticlockwise. s runs up the surface, n along its normal from the
-axis outwards; speeds along s are positive where grains go with the drum, and negative in the layer that flows back.
-"""
+"""Grains in a turning drum as measured: the free surface, and the speed along it on its normal through the axis. The axis of the drum is z,
+gravity points along -y, and the drum turns anticlockwise. s runs up the surface, n along its normal from the axis outwards; speeds along s
+are positive where grains go with the drum, and negative in the layer that flows back."""
 
 from __future__ import annotations
 
@@ -126,11 +124,9 @@ def layer_flux(place: Array, speed: Array, turn: float, surface: float) -> tuple
 
 
 def surface_line(plane: Array, cell: float, radius: float, diameter: float) -> float:
-    """Angle (rad) of the line through the free surface within half a radius of the normal through the axis.
-
-    `plane` (x, y): volume of the grains in square cells of width `cell` (m) about the axis. It is smoothed over a diameter, so that its
-    fall to half of the bed's fraction is found on each of several normals; the normals turn with the line until both are square.
-    """
+    """Angle (rad) of the line through the free surface within half a radius of the normal through the axis. `plane` (x, y): volume of
+    grains in square cells of width `cell` (m) about the axis, smoothed over a diameter. The surface is at half of the bed's fraction on
+    each of several normals, which turn with the line until both are perpendicular."""
     smooth, angle, middle = gaussian_filter(plane, 0.5 * diameter / cell), 0.0, 0.5 * (np.array(plane.shape) - 1.0)
     along, up = np.linspace(-0.5 * radius, 0.5 * radius, 25), np.linspace(-radius, radius, round(4.0 * radius / diameter))
     x, y = np.meshgrid((np.arange(plane.shape[0]) - middle[0]) * cell, (np.arange(plane.shape[1]) - middle[1]) * cell, indexing="ij")

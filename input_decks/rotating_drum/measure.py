@@ -1,8 +1,5 @@
-"""Rotating drum: flow on the normal of the free surface through the axis, compared with particle tracking and another code.
-
-V&V 20: the error E = S − D of a simulated value S against the datum D is known within U_val, U_val² = U_num² + U_input² + U_D². A run knows
-how it scatters in time and the limits of the datum; the studies of friction and stiffness add U_input and U_num.
-"""
+"""Rotating drum: flow on the normal of the free surface through the axis, compared with particle tracking and another code. V&V 20: E = S −
+D is known within U_val, U_val² = U_num² + U_input² + U_D²; the studies of friction and stiffness add U_input and U_num."""
 
 import math
 from pathlib import Path
@@ -49,11 +46,8 @@ def fluxes() -> tuple[float, float]:
 
 
 def data() -> dict[str, Estimate]:
-    """What the tracked points say of the quantities, by the same definitions.
-
-    U_D has what closes the balance of mass if the quantity alone is wrong: a faster layer, a deeper one, or less of the bed below it. The
-    shape of the profile does not depend on an error of scale in speed or place, nor on one of the origin of places.
-    """
+    """The quantities of the tracked points, by the same definitions. U_D includes the change that would close the balance of mass: a faster
+    layer, a deeper one, or less of the bed below it. Errors of scale or origin do not affect the shape of the profile."""
     n, u = tracked()
     turn, top = change_of_sign(n, u), float(n[-1])
     returned, carried = fluxes()

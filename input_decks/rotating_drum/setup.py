@@ -30,10 +30,8 @@ def setup(p: Parameters) -> Setup:
 
 def close_packed(radius: float, depth: float, spacing: float, room: float = 0.0) -> packing.Array:
     """Points (n, 3) in m within `radius` (m) of the z axis, which are at least `spacing` (m) apart, with the period `depth` (m) along z;
-    or, with `room` (m), that far or farther from the ends z = 0 and z = `depth`.
-
-    Layers of a face-centred lattice: stretched along z to fit, or compressed along z and stretched across, whichever holds more.
-    """
+    or, with `room` (m), that far or farther from the ends z = 0 and z = `depth`. Layers of a face-centred lattice: stretched along z to
+    fit, or compressed along z and stretched across, whichever holds more."""
     span = depth - 2.0 * room
     fewest = int(math.sqrt(2.0) * span / spacing)
     if room > 0.0:

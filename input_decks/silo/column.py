@@ -1,17 +1,9 @@
-"""A silo as measured: forces and stresses over height bands and sectors of the walls, and what Janssen's law makes of them.
-
-Everything is defined at the wall: the cross-section and the solid fraction count the volume up to it, although the grains' centres keep
-half a diameter off. K is the wall's normal stress over the mean sigma_zz of the cross-section, mu_mob the wall's shear over its normal
-stress, both measured in the bulk, without the lowest diameter, where the base orders the packing, and the uppermost, where hardly anything
-presses: lower half and upper half have the same K, but twice as many grains scatter less. Both together are the walls' shear
-over sigma_zz, which the balance of forces makes of the same shear: Janssen's law with them holds in a column whenever its shear is
-proportional to sigma_zz, in an almost frictionless one too. What can be predicted instead is the law with `contact_ratio`, K of the forces
-between grains, and the kinetic friction that the wall was given, where the wall mobilises that; or with the numbers of another column.
-
-Wet grains are also pulled to the wall by their liquid bridges, with a stress a that adds to the pressure in the contacts but not to the
-wall's net normal stress. Janssen's balance d sigma / dh = rho_b g - 2 tau / R with tau = mu_mob (K sigma + a) then gives the same law with
-the specific weight rho_b g - 2 mu_mob a / R, and mu_mob = tau / (sigma_rr + a). Each grain at the wall contributes the force of its bridge.
-"""
+"""A silo as measured: forces and stresses over height bands and sectors of the walls, and Janssen's law from them. Cross-section and solid
+fraction count the volume up to the wall. K: normal stress of the wall over the mean sigma_zz of the cross-section. mu_mob: shear over
+normal stress of the wall. Both are measured in the bulk, without one diameter at base and surface. K mu_mob is shear over sigma_zz, and the
+balance of forces has the same shear, so Janssen's law with them holds for any shear proportional to sigma_zz. A prediction is the law with
+`contact_ratio`, K of the forces between grains, and the kinetic friction of the wall, where the wall mobilises it. Liquid bridges pull
+grains to the wall with a stress a: tau = mu_mob (K sigma + a) leads to the same law with the specific weight rho_b g - 2 mu_mob a / R."""
 
 from __future__ import annotations
 
@@ -42,17 +34,13 @@ SLIDES = 0.1
 
 @dataclass(frozen=True)
 class Column:
-    """One replica: arrays over frames, height bands (or the levels between them) and sectors of the walls, in SI units; `friction` is the
-    kinetic coefficient of the walls.
-
-    Sectors (with soft borders) are equivalent by symmetry, so they resample the disorder of the packing: what is measured on those that are
-    kept is scaled up to the whole. (frames, bands, sectors): wall forces `normal`, `shear` and `adhesion`, the pull of liquid bridges to
-    the wall (N); solid `volume` (m3). (frames, bands): the walls' `lift` and the grains' weight `weight_above`, and the upward force
-    `net_above` that accelerates the grains above (N); vertical contact stress `field` (Pa), and the one towards the walls `pressing` by
-    sectors (Pa), which sum up to it. (frames, levels, ...): `level_lift`, by sectors too, and
-    `level_weight`. (frames,): force `base` on the base (N). (frames, 3) in N: `rubbing`, the normal force of all contacts with the wall in
-    the bulk, and normal force and friction of those that slide.
-    """
+    """One replica: arrays over frames, height bands (or the levels between them) and sectors of the walls, in SI units; `friction`: kinetic
+    coefficient of the walls. Sectors are equivalent by symmetry and resample the packing: sums over those that are kept are scaled up.
+    (frames, bands, sectors): wall forces `normal`, `shear` and `adhesion`, the pull of liquid bridges (N); solid `volume` (m3); contact
+    stress towards the walls, `pressing` (Pa). (frames, bands): `lift` of the walls, `weight_above` and `net_above`, the upward force that
+    accelerates the grains above (N); vertical contact stress `field` (Pa). (frames, levels, ...): `level_lift`, by sectors too,
+    `level_weight`. (frames,): force on the `base` (N). (frames, 3): `rubbing`, normal force of all contacts with the wall in the bulk, and
+    normal force and friction of those that slide (N)."""
 
     edges: Array
     height: float
@@ -202,10 +190,8 @@ class Column:
         return float(self.fractions(frames, sectors)[self.bulk].mean())
 
     def field_errors(self) -> Array:
-        """Relative deviation (frames,) of the contact-stress field from the balance, over the bands below the uppermost two diameters.
-
-        With what accelerates the grains above, the balance holds in each frame, not only in the mean of many.
-        """
+        """Relative deviation (frames,) of the contact-stress field from the balance, over the bands below the uppermost two diameters. With
+        what accelerates the grains above, the balance holds in each frame, not only in the mean of many."""
         chosen = self.middle < self.height - 2.0 * self.diameter
         total = ((self.weight_above - self.lift + self.net_above) / self.vessel.area)[:, chosen].sum(axis=1)
         return (self.field[:, chosen].sum(axis=1) - total) / total.mean()
@@ -251,11 +237,9 @@ def wall_bridges(values: Mapping[str, Any]) -> Bridges | None:
 
 
 def wall_pull(grains: GrainFrame, side: Array, silo: Container, bridges: Bridges | None) -> Array:
-    """Force (n,) in N of the wall's liquid bridges on each grain, towards the wall; `side` (n, 3): force of the wall on it.
-
-    A grain that touches the wall has a bridge to it, whose force does not depend on the overlap. One that does not touch feels nothing but
-    its bridge, if it has one.
-    """
+    """Force (n,) in N of the wall's liquid bridges on each grain, towards the wall; `side` (n, 3): force of the wall on it. A grain that
+    touches the wall has a bridge to it, whose force does not depend on the overlap. One that does not touch feels nothing but its bridge,
+    if it has one."""
     if bridges is None:
         return np.zeros(len(grains.radii))
     touching = silo.distance(grains.positions) <= grains.radii

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import add
@@ -99,11 +96,10 @@ def read(replica: Replica) -> Silo:
         return coarse_grain(grains, contacts, walls, cells, layers, lambda place: vessel.wall_shares(place, sectors))
 
     total, rows = [], []
-    with _one_thread():
-        for grains, (found, zone) in replica.mapped(of_frame):
-            recorder.add(grains)
-            total.append(found)
-            rows.append((zone.stress, zone.column, grains.wall_forces["side"][:, 2].sum(), grains.step, grains.masses.sum()))
+    for grains, (found, zone) in replica.mapped(of_frame):
+        recorder.add(grains)
+        total.append(found)
+        rows.append((zone.stress, zone.column, grains.wall_forces["side"][:, 2].sum(), grains.step, grains.masses.sum()))
     stresses, section, lift, steps, masses = (np.array(part) for part in zip(*rows, strict=True))
     times, weight = replica.times(), float(masses[-1]) * float(given["gravity"])
     wall = np.full((len(cells.heights), 2), np.nan)
@@ -112,34 +108,12 @@ def read(replica: Replica) -> Silo:
     return Silo(cells, reduce(add, total), stresses, section, wall, error, weight)
 
 
-def _one_thread() -> AbstractContextManager[Any]:
-    """Products of tall thin matrices gain nothing from more threads, which wait for each other on a busy machine."""
-    from threadpoolctl import threadpool_limits  # slow to import
-
-    return threadpool_limits(1, "blas")
-
-
-def _all(replicas: Sequence[Replica]) -> list[Silo]:
-    """`read` of all replicas, as many at a time as this process has cores: most of it is done in arrays, which leave the interpreter to
-    others."""
-    with _one_thread(), ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        return list(pool.map(read, replicas))
-
-
-class _Janssen:
-    """Janssen's law from the measured quantities of a case."""
-
-    def __init__(self, known: Mapping[str, Value], radius: float, height: float, specific: float) -> None:
-        """`specific`: weight (N/m3) of the column per volume."""
-        found = [known[name].estimate for name in ("stress_ratio_k", "wall_mobilisation", "wall_adhesion") if name in known]
-        self._values = [one.value for one in found]
-        self._radius, self.height, self._specific = radius, height, specific
-
-    def __call__(self, heights: Array) -> Array:
-        """sigma_zz (Pa) at `heights` (m)."""
-        k, friction, *adhesion = self._values
-        weight = self._specific - 2.0 * friction * sum(adhesion) / self._radius
-        return janssen.stress(np.maximum(self.height - heights, 0.0), self._radius / (2.0 * k * friction), weight)
+def _law(known: Mapping[str, Value], radius: float, depth: Array, specific: float) -> Array:
+    """sigma_zz (Pa) at `depth` (m) by Janssen's law from the measured quantities of a case; `specific`: weight (N/m3) per volume."""
+    k, friction, *adhesion = (known[name].estimate.value for name in ("stress_ratio_k", "wall_mobilisation", "wall_adhesion")
+                              if name in known)
+    weight = specific - 2.0 * friction * sum(adhesion) / radius
+    return janssen.stress(np.maximum(depth, 0.0), radius / (2.0 * k * friction), weight)
 
 
 def _deviation(silos: Sequence[Silo], columns: Sequence[Column]) -> Value:
@@ -163,11 +137,11 @@ def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measure
     given = replicas[0].parameters
     radius, diameter, gravity = (float(given[name]) for name in ("cylinder_radius", "grain_diameter", "gravity"))
     height = known["filling_height"].estimate.value * radius
-    found = _all(replicas)
+    found = [read(replica) for replica in replicas]
     cells = max((one.rings for one in found), key=lambda one: len(one.heights))
     silos = [one.up_to(cells) for one in found]
     specific = float(np.mean([one.weight for one in silos])) / (np.pi * radius**2 * height)
-    law, zero = _Janssen(known, radius, height, specific), Estimate(0.0, 0.0)
+    law, zero = _law(known, radius, height - cells.heights, specific), Estimate(0.0, 0.0)
     near = {"axis": cells.radii < 0.5 * radius, "wall": (cells.radii > radius - diameter) & (cells.radii < radius)}
 
     def worst(one: Silo, accelerated: bool) -> Estimate:
@@ -184,10 +158,10 @@ def measured(replicas: Sequence[Replica], known: Mapping[str, Value]) -> Measure
     remark = (f"The fields are coarse-grained with a Gaussian of width {diameter:g} m = 1 d and averaged around the axis in closed form, "
               "which conserves mass exactly and momentum but for the quadrature along the contacts; "
               "within one width of a wall they are means over the part of the kernel inside.")
-    return Measurement(values, remarks=[remark], fields=_dataset(silos, law, diameter, gravity))
+    return Measurement(values, remarks=[remark], fields=_dataset(silos, law, height, diameter, gravity))
 
 
-def _dataset(silos: Sequence[Silo], law: _Janssen, diameter: float, gravity: float) -> Any:
+def _dataset(silos: Sequence[Silo], law: Array, height: float, diameter: float, gravity: float) -> Any:
     cells, (both, high), fields = silos[0].rings, (("radius", "height"), ("height",)), reduce(add, (one.fields for one in silos))
     stress = [over_replicas([block_mean(layer) for layer in layers]) for layers in zip(*(one.section.T for one in silos), strict=True)]
     ratio = [[over_replicas([one.k(1 + band, slice(ring, ring + 1)) for one in silos]) for ring in range(len(cells.radii))]
@@ -205,11 +179,11 @@ def _dataset(silos: Sequence[Silo], law: _Janssen, diameter: float, gravity: flo
                                "wall forces minus weight minus divergence of the vertical stresses"),
         "net_force": variable(both, fields.mean("net", cells), "N m-3", "upward force density that accelerates grains"),
         **with_interval("stress_zz_section", high, stress, "Pa", "vertical stress, mean over the cross-section"),
-        "janssen": variable(high, law(cells.heights), "Pa", "vertical stress by Janssen's law with K and friction of the same column"),
+        "janssen": variable(high, law, "Pa", "vertical stress by Janssen's law with K and friction of the same column"),
         "wall_normal": variable(high, wall[:, 0], "Pa", "normal stress of the wall"),
         "wall_shear": variable(high, wall[:, 1], "Pa", "upward shear stress of the wall"),
         **with_interval("k_profile", ("band", "radius"), ratio, "1", "sigma_rr over sigma_zz"),
-        "band_bounds": variable(("band", "bounds"), np.array(BANDS) * law.height, "m",
+        "band_bounds": variable(("band", "bounds"), np.array(BANDS) * height, "m",
                                 "heights between which k_profile is averaged, mean over packings"),
         **{f"{name}_bounds": variable((name, "bounds"), np.stack([edges[:-1], edges[1:]], axis=1), "m",
                                       f"borders of the {'rings' if name == 'radius' else 'layers'}") for name, edges in borders.items()},
@@ -217,5 +191,5 @@ def _dataset(silos: Sequence[Silo], law: _Janssen, diameter: float, gravity: flo
     coordinates = {"radius": variable(["radius"], cells.radii, "m", "distance from the axis"),
                    "height": variable(high, cells.heights, "m", "height above the base")}
     return labelled(variables, coordinates, kernel="gaussian", width=cells.width, averaged="around the axis and over frames",
-                    frames=fields.frames, replicas=len(silos), vessel_radius=cells.radius, filling_height=law.height,
+                    frames=fields.frames, replicas=len(silos), vessel_radius=cells.radius, filling_height=height,
                     grain_diameter=diameter)

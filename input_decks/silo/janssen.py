@@ -1,14 +1,13 @@
-"""Janssen's law of the stresses in a silo, and its fits to measured stresses.
-
-sigma_zz = w lambda (1 - exp(-h / lambda)) at the depth h below the surface for the specific weight w (N/m3) and the decay length lambda
-(m). With the filled mass for h, the apparent mass for sigma_zz and w = 1 it is the law of the mass that the base feels.
-"""
+"""Janssen's law of the stresses in a silo, and its fits to measured stresses. sigma_zz = w lambda (1 - exp(-h / lambda)) at the depth h
+below the surface for the specific weight w (N/m3) and the decay length lambda (m). With the filled mass for h, the apparent mass for
+sigma_zz and w = 1 it is the law of the mass that the base feels."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from dembark.postproc.replica import Array
 
@@ -25,12 +24,8 @@ def base_share(depth: Array | float) -> Array:
 
 
 def fitted_friction(depth: Array, shares: Array) -> float:
-    """K mu that fits `base_share` best to `shares` (n,) of silos as deep as `depth` (n,) over their sizes, relative to each of them.
-
-    It is a number for every silo, 0 for a liquid, where lambda = size / (2 K mu) is not.
-    """
-    from scipy.optimize import least_squares  # slow to import, and not needed before something is measured
-
+    """K mu that fits `base_share` best to `shares` (n,) of silos as deep as `depth` (n,) over their sizes, relative to each of them. It is
+    a number for every silo, 0 for a liquid, where lambda = size / (2 K mu) is not."""
     return float(least_squares(lambda p: base_share(2.0 * p[0] * depth) / shares - 1.0, [0.2]).x[0])
 
 
@@ -41,8 +36,6 @@ def two_parameter(depth: Array, length: float, onset: float, weight: float = 1.0
 
 def fitted_length(depth: Array, measured: Array, start: float, weight: float = 1.0) -> float:
     """lambda (m) that fits the stress `measured` (n,) in Pa best, by least squares from `start` on."""
-    from scipy.optimize import least_squares  # slow to import, and not needed before something is measured
-
     fit = least_squares(lambda p: (stress(depth, np.exp(p[0]), weight) - measured) / measured.max(), [np.log(start)])
     return float(np.exp(fit.x[0]))
 
@@ -50,8 +43,6 @@ def fitted_length(depth: Array, measured: Array, start: float, weight: float = 1
 def fitted_pair(depth: Array, measured: Array, starts: Sequence[tuple[float, float]], limits: Sequence[tuple[float, float]], scale: float,
                 weight: float = 1.0) -> tuple[float, float]:
     """(lambda, onset) in m of the two-parameter form: the best of the fits from all `starts`, within `limits` (low, high) of the two."""
-    from scipy.optimize import least_squares  # as above
-
     fits = [least_squares(lambda p: (two_parameter(depth, p[0], p[1], weight) - measured) / measured.max(), start,
                           bounds=tuple(zip(*limits, strict=True)), x_scale=scale) for start in starts]
     length, onset = min(fits, key=lambda fit: fit.cost).x

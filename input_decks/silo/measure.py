@@ -1,8 +1,5 @@
-"""Silo: stresses of a packing in a vertical cylinder whose wall creeps upward, against Janssen's law.
-
-sigma_zz = rho_b g lambda (1 - exp(-h / lambda)), lambda = R / (2 K mu), h the depth below the surface. The force on the base is predicted
-with K of the contact stress and the friction that the wall was given; in the studies, for other fillings and radii, with K and mu of one.
-"""
+"""Silo: stresses of a packing in a vertical cylinder whose wall creeps upward, against Janssen's law sigma_zz = rho_b g lambda (1 - exp(-h
+/ lambda)), lambda = R / (2 K mu), h: depth below the surface."""
 
 from dataclasses import replace
 

@@ -85,11 +85,8 @@ def scalars(one: Column) -> dict[str, Estimate]:
 
 
 def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
-    """The force on the base of cylinders of other fillings or radii, predicted from the one of the variant `dry`, and K mu fitted to them.
-
-    `points` are the results of the variants. Of `dry` come K of the contact stress, the mobilised friction and the bulk density; of the
-    others only what was filled in, and the radius.
-    """
+    """The force on the base of cylinders of other fillings or radii (results `points`), predicted from that of the variant `dry`, and K mu
+    fitted to them. Of `dry` come K of the contact stress, mobilised friction and bulk density; of the others filled mass and radius."""
     known = next(point for point in points if point["variant"] == "dry")
     held = [point for point in points if point is not known]
     k_mu = of_point(known, "k_mu_contacts")
@@ -141,11 +138,8 @@ def mobilised(points: Sequence[Mapping[str, Any]]) -> Measurement:
 
 
 def measured(columns: Sequence[Column], size: str, across: str, friction: Mapping[str, float]) -> Measurement:
-    """Values, profiles and remarks of all columns of a series.
-
-    `size`: symbol of the length in Janssen's law; `across`: letter of the direction to the wall; `friction`: the coefficients
-    `wall_static` and `wall_kinetic`.
-    """
+    """Values, profiles and remarks of all columns of a series. `size`: symbol of the length in Janssen's law; `across`: letter of the
+    direction to the wall; `friction`: the coefficients `wall_static` and `wall_kinetic`."""
     found, wet = [scalars(column) for column in columns], bool(columns[0].adhesion.any())
     over = {name: pooled(found, name) for name in found[0]}
     kinetic = friction["wall_kinetic"]

@@ -1,9 +1,6 @@
-"""Silos' geometries: where the walls are, which way they press, and how places along them divide into sectors.
-
-In both the walls have the area 2 / size for each volume, so Janssen's law is the same: lambda = size / (2 K mu_mob). Sectors share what
-lies between the middles of two of them linearly: with sharp borders the chance on which side a grain's centre lies would pass for disorder
-of the packing.
-"""
+"""Geometries of silos: walls, their normals, and sectors along them. In both geometries walls have the area 2 / size for each volume, so
+that Janssen's law is the same: lambda = size / (2 K mu_mob). A place between the middles of two sectors belongs to both, linearly: sharp
+borders would add scatter."""
 
 from __future__ import annotations
 
@@ -107,11 +104,8 @@ Container = Cylinder | Slab
 
 
 def overlap(sectors: int) -> float:
-    """Variance among the sums over sectors that share grains in this way, over that of separate ones, for uncorrelated forces.
-
-    Of each grain's share u and 1 - u, u even in [0, 1], the squares have the mean 2/3 and the products 1/3, the latter as covariance
-    with neighbours on the same wall.
-    """
+    """Variance among sums over sectors that share grains, over that of separate ones, for uncorrelated forces: the shares u and 1 - u of a
+    grain, u even in [0, 1], have squares with the mean 2/3 and products with 1/3, a covariance of neighbours on the same wall."""
     return 2.0 / 3.0 - 1.0 / (3.0 * (sectors - 1))
 
 

@@ -1,7 +1,5 @@
-"""Single impacts, in which nothing is random: what the spheres of a run did, and the solutions that it is compared with.
-
-The first half of the spheres is of material A, the second of B, each with a partner of its own or the plane z = 0.
-"""
+"""Single impacts, in which nothing is random: what the spheres of a run did, and the solutions that it is compared with. The first half of
+the spheres is of material A, the second of B, each with a partner of its own or the plane z = 0."""
 
 from __future__ import annotations
 
@@ -93,10 +91,9 @@ def _top(values: Array) -> Array:
 
 
 class Solutions:
-    """What impacts are held against: the `scheme` (numbers) at the run's phase and three others; where friction acts the contact law
-    solved exactly and in half the parts, `law`, and, for elastic impacts on a plane, where it is known, partial `slip`.
-
-    `in_parts`: the contacts of the run slip in parts. Then that is the law, and the scheme knows the motion along the normal only."""
+    """What impacts are held against: the `scheme` (numbers) at the run's phase and three others; where friction acts the contact law solved
+    exactly and in half the parts, `law`, and, for elastic impacts on a plane, where it is known, partial `slip`. `in_parts`: the contacts
+    of the run slip in parts. Then that is the law, and the scheme knows the motion along the normal only."""
 
     def __init__(self, one: Impacts, time_step: float, phase: float, in_parts: bool = False) -> None:
         length = float((1.4 * one.duration * (1.0 - np.log(one.restitution) / 4.0)).max())

@@ -1,10 +1,6 @@
-"""Single contact: the eight impact tests of Chung and Ooi (2011).
-
-Each engine is held against four things: the same scheme written down again, from which it may differ by round-off; what is known exactly
-(Hertz; the restitution coefficient that was asked for; the contact law, integrated until the step does not matter); the curves
-that they published; and, for information, theories of another contact (rigid bodies that slide throughout; partial slip after Mindlin and
-Deresiewicz).
-"""
+"""Single contact: the eight impact tests of Chung and Ooi (2011). An engine is compared with a second implementation of its scheme, with
+what is known exactly (Hertz, restitution, the contact law integrated to convergence), with the published curves and, without a verdict,
+with theories of other contacts (rigid bodies that slide; partial slip after Mindlin and Deresiewicz)."""
 
 from pathlib import Path
 

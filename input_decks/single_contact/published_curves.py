@@ -19,13 +19,10 @@ from .impacts import worst
 
 
 def beside_published(found: Measurement, path: Path, variant: str, labels: Mapping[str, str]) -> Measurement:
-    """`found` with a value <method>_<quantity> for each published curve of `variant` that it has, where it is farthest, and the curves.
-
-    `path`: a table of points with the columns variant, quantity, material, method, x, y and the 95 % limits of their reading,
-    x_uncertainty and y_uncertainty; points with a reason in the column left_out, if there is one, are drawn but not judged. The curve
-    <quantity>_<material> of `found` is interpolated to those inside its range. Farthest is where the difference exceeds its uncertainty
-    most, of all materials. `labels`: who published, by method.
-    """
+    """`found` with a value <method>_<quantity> for each published curve of `variant`, where it is farthest, and the curves. `path`: a table
+    with the columns variant, quantity, material, method, x, y, x_uncertainty and y_uncertainty (95 % limits of the reading), and left_out,
+    why a point is drawn but not judged. The curve <quantity>_<material> of `found` is interpolated to the points in its range; farthest is
+    where the difference exceeds its uncertainty most. `labels`: who published, by method."""
     own = {one["name"]: one for one in found.profiles}
     rows = [row for row in reference_rows(path, variant=variant) if f"{row['quantity']}_{row['material']}" in own]
     values, curves, excess = dict(found.values), list(found.profiles), dict[str, float]()

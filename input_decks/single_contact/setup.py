@@ -10,9 +10,7 @@ from dembark.input_decks.common.setup import Parameters, Setup, strides
 
 def setup(p: Parameters) -> Setup:
     """Bodies 1 ... points are of material A, then those of B, then the partners in the same order; the point of touch is the origin of z.
-
-    Types: A, one for each restitution coefficient; B likewise; the partners of A; those of B. Nothing leaves the box on the way.
-    """
+    Types: A, one for each restitution coefficient; B likewise; the partners of A; those of B. Nothing leaves the box on the way."""
     output, lead = strides(p.duration, p.time_step, p.frames - 1), p.lead_steps * p.time_step
     # What is swept is linear in the number of a sphere among those of its material.
     values = [p.sweep_from + (p.sweep_to - p.sweep_from) * k / max(p.points - 1, 1) for k in range(p.points)]

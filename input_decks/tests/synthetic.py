@@ -73,14 +73,12 @@ def told(folder: Path, **changes: float) -> Path:
 def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "dry", k: float = 0.8, friction: float = 0.25,
          noise: float = 0.0, seed: int = 0, lost_wall_force: float = 0.0, bridge_volume: float = 0.0, smooth: float = 1.0,
          lost_contacts: int = 0, stated: float | None = None, inner: float = 1.0, heavier: float = 1.0, sticking: float = 0.0) -> Path:
-    """Write a replica whose wall and base forces follow Janssen's law; returns the engine's folder.
-
-    `noise`: relative scatter of the wall forces among grains and frames; `lost_wall_force`: share that is missing in time.csv;
-    `bridge_volume` (m3): every grain hangs on the wall by a liquid bridge too, whose pull is rubbed like the rest of the pressure;
-    `smooth`: friction of the wall's lower half over that of its upper one; `lost_contacts`: how many of the 24 between two layers are
-    missing; `sticking`: share of the grains at the wall that move with it. Wrong physics: `stated` is the wall's friction that the run says
-    it had, `inner` the stress across inside over that at the wall, `heavier` the gravity that acts over the one it says.
-    """
+    """Write a replica whose wall and base forces follow Janssen's law; returns the engine's folder. `noise`: relative scatter of the wall
+    forces among grains and frames; `lost_wall_force`: share that is missing in time.csv; `bridge_volume` (m3): every grain hangs on the
+    wall by a liquid bridge too, whose pull is rubbed like the rest of the pressure; `smooth`: friction of the wall's lower half over that
+    of its upper one; `lost_contacts`: how many of the 24 between two layers are missing; `sticking`: share of the grains at the wall that
+    move with it. Wrong physics: `stated` is the wall's friction that the run says it had, `inner` the stress across inside over that at the
+    wall, `heavier` the gravity that acts over the one it says."""
     random = np.random.default_rng(seed)
     radius, levels, ring = 0.025, 30, 24
     angle = 2.0 * np.pi * np.arange(ring) / ring
@@ -126,11 +124,9 @@ def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: 
 
 def plug_flow(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "smooth", slip: float = 0.4,
               decay: float = 2.0, noise: float = 0.02, seed: int = 0, tilt: float = 0.0, lift: float = 1.0, faster: float = 1.0) -> Path:
-    """Write a replica with v / v_core = 1 - slip exp(-distance / (decay d)) and flux v0 rho_b; returns the engine's folder.
-
-    `tilt`: a linear variation of the core's velocity from wall to wall, which a flat core must not have; `lift`: what walls and base
-    carry over the weight; `faster`: velocities over those of the displacements.
-    """
+    """Write a replica with v / v_core = 1 - slip exp(-distance / (decay d)) and flux v0 rho_b; returns the engine's folder. `tilt`: a
+    linear variation of the core's velocity from wall to wall, which a flat core must not have; `lift`: what walls and base carry over the
+    weight; `faster`: velocities over those of the displacements."""
     random = np.random.default_rng(seed)
     width, depth, speed, step_length = 20 * DIAMETER, 5 * DIAMETER, 0.02, 1e-5
     across, along, up = (np.arange(count) + 0.5 for count in (20, 5, 30))

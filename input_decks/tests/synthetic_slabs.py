@@ -14,11 +14,9 @@ STEP = 1e-5
 def plane_silo(results: Path, *, replica: int = 1, k: float = 0.7, friction: float = 0.2, noise: float = 0.0, seed: int = 0,
                tilt: float = 0.0, smooth: float = 1.0, lost_contacts: int = 0, lost_wall_force: float = 0.0,
                stated: float | None = None, inner: float = 1.0) -> Path:
-    """Write a replica whose walls and base follow Janssen's law with lambda = W / (2 k friction); returns the engine's folder.
-
-    `tilt`: the left wall carries 1 + tilt, the right one 1 - tilt of its share, which the mean over both does not show;
-    `smooth`, `lost_contacts`, `lost_wall_force`, `stated` and `inner`: as of the silo.
-    """
+    """Write a replica whose walls and base follow Janssen's law with lambda = W / (2 k friction); returns the engine's folder. `tilt`: the
+    left wall carries 1 + tilt, the right one 1 - tilt of its share, which the mean over both does not show; `smooth`, `lost_contacts`,
+    `lost_wall_force`, `stated` and `inner`: as of the silo."""
     random = np.random.default_rng(seed)
     across, along, levels = 10, 6, 40
     width, depth, top = across * DIAMETER, along * DIAMETER, levels * DIAMETER
@@ -65,10 +63,8 @@ def gravity_channel(results: Path, *, cells: int = 20, variant: str = "w20", rep
                     decay: float = 1.5, noise: float = 0.02, friction: float = 1.0, acceleration: float = 0.0, drift: float = 0.0,
                     swing: float = 0.2, seed: int = 0) -> Path:
     """Write a replica with u = u_max - (u_max - u_slip) exp(-(distance - d/2) / (decay d)), velocities over sqrt(g W), W = `cells` d.
-
     `friction`: mean friction of the walls over the weight; `acceleration` (over g): the whole flow's; `drift`: relative growth of the
-    kinetic energy over the window; `swing`: standard deviation of the friction's rows over its mean. Returns the engine's folder.
-    """
+    kinetic energy over the window; `swing`: standard deviation of the friction's rows over its mean. Returns the engine's folder."""
     random = np.random.default_rng(seed)
     width, depth, length = cells * DIAMETER, 5 * DIAMETER, 5 * DIAMETER
     scale = np.sqrt(GRAVITY * width)

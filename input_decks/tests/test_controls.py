@@ -1,8 +1,6 @@
-"""Negative controls: every check has wrong physics that fails it, and passes without it.
-
-case.toml names them, `[controls]`: wrong physics = the quantities that it fails. The module controls_<case>.py beside this file does it:
-`controls(folder)` yields a `Control` for each name.
-"""
+"""Negative controls: every check has wrong physics that fails it, and passes without it. case.toml names them, `[controls]`: wrong physics
+= the quantities that it fails. The module controls_<case>.py beside this file does it: `controls(folder)` yields a `Control` for each
+name."""
 
 from __future__ import annotations
 

@@ -114,10 +114,8 @@ def test_engines_start_from_the_same_grains(case: str, finished: Any) -> None:
 
 @pytest.mark.parametrize(("case", "engine", "variant"), [run for run in RUNS if run.values[0] != "column_collapse"])
 def test_forces_on_each_grain_add_up(case: str, engine: str, variant: str, finished: Any) -> None:
-    """Contacts, walls and gravity make up the engine's own total; liquid bridges over a gap are contacts too.
-
-    Dashpots see the velocities at the time of the dump, half a step later than the engine's total; the grains hardly move here.
-    """
+    """Contacts, walls and gravity make up the engine's own total; liquid bridges over a gap are contacts too. Dashpots see the velocities
+    at the time of the dump, half a step later than the engine's total; the grains hardly move here."""
     folder = finished(case, engine, variant).folder
     for grains, contacts in zip(GrainsDump(folder / "grains.dump"), ContactsDump(folder / "contacts.dump"), strict=True):
         total = sum(grains.wall_forces.values()) + grains.masses[:, None] * np.array([0.0, 0.0, -9.81])

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dembark.input_decks.common.drive_phases import binned, read_phases, velocity_field
+from dembark.input_decks.common.drive_phases import binned, read_phases
 from dembark.input_decks.common.vibration import PHASES
 from dembark.postproc import DumpError, GrainsDump
 from dembark.postproc.tests.dumps import grains_text
@@ -33,20 +33,6 @@ def test_frames_are_sorted_by_phase_and_the_shaking_cancels(tmp_path: Path) -> N
     assert run.period == pytest.approx(8e-3) and run.phases.tolist() == [*range(8)] * 3 + [0]
     assert [frame.step for frame in run.at(2)] == [100, 180, 260]
     np.testing.assert_allclose(run.displacements(), np.broadcast_to(DRIFT, (17, 2, 3)), atol=1e-9)
-    heights = run.mean(lambda frame: frame.positions[:, 2]) - run.mean(lambda frame: frame.positions[:, 2]).mean(axis=0)
-    np.testing.assert_allclose(heights[:, 0], SHAKE * np.sin(np.arange(8) * np.pi / 4.0), atol=3 * abs(DRIFT[2]))
-
-
-def test_the_drift_is_found_where_the_grains_are(tmp_path: Path) -> None:
-    run = read_phases(dump(tmp_path, range(8, 33)), PERIOD, STEP)
-    field = velocity_field(run, [np.array([-0.05, 0.05, 0.2, 0.3]), np.array([-0.1, 0.1])])
-    np.testing.assert_allclose(field[:2, 0], np.broadcast_to(DRIFT[[0, 2]] / 8e-3, (2, 2)), atol=1e-6)
-    assert np.isnan(field[2]).all()
-
-
-def test_a_phase_without_frames_is_not_a_number(tmp_path: Path) -> None:
-    found = read_phases(dump(tmp_path, range(8, 12)), PERIOD, STEP).mean(lambda frame: frame.masses)
-    assert np.isfinite(found[:4]).all() and np.isnan(found[4:]).all()
 
 
 def test_cell_means_are_weighted() -> None:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dembark.input_decks.common.vibration import PHASES
-from dembark.input_decks.vibrated_layer.standing_waves import WINDOW, Waves, amplitude, onset, rank_correlation, surface_levels
+from dembark.input_decks.vibrated_layer.standing_waves import WINDOW, Waves, amplitude, onset, surface_levels
 
 D, LENGTH, CELLS = 0.005, 0.4, 40
 
@@ -131,10 +131,3 @@ def test_too_few_points_above_noise_have_no_onset() -> None:
     seen = np.array([False, False, True, True])
     assert math.isinf(onset(np.array([2.0, 2.5, 3.0, 3.5]), np.array([0.0, 0.0, 0.5, 1.0]), np.zeros(4), seen).half)
     assert math.isnan(onset(np.array([2.0, 2.5, 3.0]), np.array([3.0, 2.0, 1.0]), np.zeros(3), np.ones(3, bool)).value)
-
-
-def test_ranks() -> None:
-    assert rank_correlation([1, 2, 3, 4, 5], [9, 7, 5, 3, 1]) == pytest.approx(-1.0)
-    assert rank_correlation([1, 2, 3, 4, 5], [9, 5, 7, 3, 1]) == pytest.approx(-0.9)
-    assert -1.0 < rank_correlation([1, 2, 3, 4, 5], [9, 7, 7, 3, 1]) < -0.95
-    assert rank_correlation([1, 2, 3], [4, 4, 4]) == 0.0

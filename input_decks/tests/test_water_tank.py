@@ -27,8 +27,7 @@ def run(scene: str, heavier: float = 1.0, lighter: float = 1.0, slower: float = 
         made: float = 0.0, braked: float = 0.0, given: float = 0.1) -> Any:
     """The theory of `scene`, or the experiment: with gravity stronger by the factor `heavier`, water `lighter` by a factor, a fall that
     takes `slower` times as long, a slot `lost` (spacings) narrower, `leaked` particles in the floor, the part `made` of the energy from
-    nowhere, momenta that vanish by the part `braked`, a block that gives the part
-    `given` of its momentum to the water."""
+    nowhere, momenta that vanish by the part `braked`, a block that gives the part `given` of its momentum to the water."""
     p = defaults("water_tank") | find("water_tank").variants[scene]
     dx, depth, width, count = p["size"] / p["across"], p["water_depth"], WIDTHS[scene], COUNTS[scene]
     steps = round(p["run_time"] / DT)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,17 +14,7 @@ from dembark.input_decks.common.estimates import over_chaotic, values_and_halves
 from dembark.input_decks.common.momentum import imbalance, impulses
 from dembark.input_decks.common.motion import about_y, motion
 from dembark.input_decks.common.power_law import ordered
-from dembark.postproc.measurement import (
-    Array,
-    Curve,
-    Measurement,
-    Points,
-    Replica,
-    Replicas,
-    Value,
-    exact,
-    profile,
-)
+from dembark.postproc.measurement import Array, Curve, Measurement, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.studies import measured
 
 WALLS = ("left", "right", "base")
@@ -134,8 +124,7 @@ def measure(replicas: Replicas) -> Measurement:
     runs = [read(replica) for replica in replicas]
     values = {"energy_balance": Value(exact(max(imbalance(replica.times()) for replica in replicas)), exact(0.0)),
               "impulse_error": Value(exact(max(run["impulse_error"] for run in runs)), exact(0.0))}
-    values |= {name: Value(over_chaotic(run[name] for run in runs)) for name in runs[0]
-               if name != "impulse_error"}
+    values |= {name: Value(over_chaotic(run[name] for run in runs)) for name in runs[0] if name != "impulse_error"}
     curves = [_history(replicas, wall) for wall in ("", "left", "right", "base")] + [_pressure(replicas, "left")]
     if "slide_slope" in runs[0]:
         # For the study, which compares bed by bed.
@@ -180,11 +169,6 @@ def _pressure(replicas: Replicas, wall: str) -> Curve:
                    reference_label="at rest")
 
 
-def _slopes(point: Mapping[str, Any]) -> Array:
-    """Of each bed, by the seed."""
-    return np.array(next(one["value"] for one in point["profiles"] if one["name"] == "slide_slopes"), float)
-
-
 def study(name: str, results: Points, along: str) -> Measurement:
     """D of the longest pulse beside one, if it is slow; or the onset on a ramp beside that of tilting."""
     results, place = ordered(results, along)
@@ -193,7 +177,7 @@ def study(name: str, results: Points, along: str) -> Measurement:
     values, halves = values_and_halves(found)
     if name != "pulse":
         # The last one is tilted at the rate of the ramp.
-        ramp, tilt = (_slopes(results[k]) for k in (0, -1))
+        ramp, tilt = (next(one["value"] for one in results[k]["profiles"] if one["name"] == "slide_slopes") for k in (0, -1))
         ratios = over_chaotic(float(one / other) for one, other in zip(ramp, tilt, strict=False))
         return Measurement({"sliding_onset": Value(ratios, exact(1.0))}, [
             profile("onset", "Onset of sliding", "angular acceleration of tilting (rad/s²); 0: ramp", "slope of effective gravity", place,

@@ -1,6 +1,5 @@
 """Transport container: a dilute bed between two walls on a base that will move, and the steps of its output."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,6 @@ import numpy as np
 from dembark.input_decks.common import packing
 from dembark.input_decks.common.motion import about_y, motion
 from dembark.input_decks.common.setup import Parameters, Setup, contacts, rectangle, rows_and_frames, time_step
-from dembark.physics import WallMotion
 
 
 def setup(p: Parameters) -> Setup:
@@ -18,26 +16,19 @@ def setup(p: Parameters) -> Setup:
     output = rows_and_frames(step, p.settle_time, p.run_time, p.frames)
     length = p.container_length * d
     moving = motion(p, start=output["first"] * step, point=(0.5 * length, 0.0, 0.0))
-    cell = 1.15 * d_max
-    count = int((length - 0.3 * d_max) / cell)
-    layers = math.ceil(1.3 * p.grain_count / count)
-    places = packing.lattice((count, 1, layers), ((length - 0.3 * d_max) / count, cell, cell), (0.15 * d_max, -0.5 * cell, 0.15 * d_max))
-    top, half = layers * cell + 2.0 * d_max, 2.0 * d
+    places, high = packing.slab(p, length, 0.0, margin=0.15 * d_max, foot=0.15 * d_max, rows=1)
+    top, half = high + 2.0 * d_max, 2.0 * d
     # Panels of about 10 d; side walls twice as high as the bed lies in the beginning.
     long, wide, high = (length / 4.0, 0.0, 0.0), (0.0, 2.0 * half, 0.0), (0.0, 0.0, top / 4.0)
     meshes = {"base": np.vstack([rectangle((length * k / 4.0, -half, 0.0), long, wide) for k in range(4)])}
     for name, x in (("left", 0.0), ("right", length)):
         meshes[name] = np.vstack([rectangle((x, -half, top * k / 4.0), wide, high) for k in range(4)])
     corners = np.array([(x, 0.0, z) for x in (0.0, length) for z in (0.0, top)])
-    reach = [_moved(moving, corners, t) for t in np.linspace(0.0, output["steps"] * step, 400)]
+    middle = np.array([0.5 * length, 0.0, 0.0])
+    reach = [middle + (corners - middle) @ about_y(moving, t).T + np.asarray(moving.displacement(t))
+             for t in np.linspace(0.0, output["steps"] * step, 400)]
     least, most = np.min(reach, axis=(0, 1)) - 2.0 * d, np.max(reach, axis=(0, 1)) + 2.0 * d
     bodies = packing.grains(p, places, [(least[0], most[0]), (-half - d, half + d), (least[2], most[2])])
     bodies = replace(bodies, positions=bodies.positions * np.array([1.0, 0.0, 1.0]))
     numbers = {"grain_count": p.grain_count, **output, "length": length}
     return Setup(output["steps"], step, bodies, {**numbers, **contacts(p, skin=0.3)}, meshes, {"motion_words": moving.words})
-
-
-def _moved(moving: WallMotion, corners: packing.Array, time: float) -> packing.Array:
-    """Where the corners (n, 3) of the container are at a time (s)."""
-    middle = np.array([0.5 * corners[:, 0].max(), 0.0, 0.0])
-    return np.asarray(middle + (corners - middle) @ about_y(moving, time).T + np.asarray(moving.displacement(time)))

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
+from scipy.stats import spearmanr
 
 from dembark.input_decks.common.momentum import unexplained
 from dembark.input_decks.common.power_law import ordered
@@ -13,7 +14,7 @@ from dembark.postproc.measurement import Curve, Estimate, Measurement, Numbers, 
 from dembark.postproc.studies import measured
 
 from .layer import Layer, mean_power, read, wave_amplitude
-from .standing_waves import Waves, amplitude, rank_correlation
+from .standing_waves import Waves, amplitude
 
 # Accelerations (g) up to which a layer is flat, and those at which it has waves at f/2 and no others; not at the onset.
 FLAT, WAVY = 2.0, (2.75, 4.0)
@@ -174,7 +175,7 @@ def study(name: str, points: Points, along: str) -> Measurement:
            for p in (one["parameters"] for one in points)]
     means = np.array([measured(one, "mean_wavelength").value for one in points])
     return Measurement(
-        {"wavelength_trend": Value(exact(rank_correlation(place, lengths)))},
+        {"wavelength_trend": Value(exact(float(np.nan_to_num(spearmanr(place, lengths).statistic))))},
         [profile("wavelength", "Length of the waves", "frequency (Hz)", "λ / d", place, [lengths], reference=np.array(law),
                  reference_label="law quoted from memory"),
          profile("mean_wavelength", "Length of the waves by their mean wave number", "frequency (Hz)", "λ / d", place, [means])])

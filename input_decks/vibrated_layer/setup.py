@@ -25,7 +25,7 @@ def setup(p: Parameters) -> Setup:
     words = (*first.words, *(word for one, other in pairwise(planned)
                              for word in change(p, other.gamma - one.gamma, (still + other.start - p.run_in - p.level_ramp) / frequency)))
     reach, foot = speed / (2.0 * math.pi * frequency), 0.15 * d_max + p.strip_rise * p.grain_diameter * (p.floor == "strips")
-    sites, height = bed(p, d_max, foot)
+    sites, height = packing.slab(p, p.layer_length, p.layer_depth, margin=0.0, foot=foot)
     top = foot + height + 4.0 * reach + 0.5 * (1.3 * speed) ** 2 / p.gravity
     box = [(0.0, p.layer_length), (0.0, p.layer_depth), (-reach - 2.0 * d_max, top)]
     grains = packing.grains(p, sites, box)
@@ -38,14 +38,6 @@ def change(p: Parameters, gamma: float, start: float) -> tuple[str, ...]:
     amplitude = gamma * p.gravity / (2.0 * math.pi * p.motion_frequency) ** 2
     return ("harmonic", "amplitude", "0", "0", f"{amplitude:.17g}", "frequency", f"{p.motion_frequency:.17g}", "phase",
             f"{p.motion_phase:.17g}", "start", f"{start:.17g}", "ramp", f"{p.level_ramp}")
-
-
-def bed(p: Parameters, d_max: float, foot: float) -> tuple[packing.Array, float]:
-    """Sites (n, 3) in m of a dilute layer above z = `foot` (m), and its height (m)."""
-    least = 1.15 * d_max
-    n_x, n_y = int(p.layer_length / least), int(p.layer_depth / least)
-    rows = math.ceil(1.3 * p.grain_count / (n_x * n_y))
-    return packing.lattice((n_x, n_y, rows), (p.layer_length / n_x, p.layer_depth / n_y, least), (0.0, 0.0, foot)), rows * least
 
 
 def plate(p: Parameters) -> packing.Array:

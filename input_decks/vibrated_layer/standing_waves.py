@@ -1,14 +1,11 @@
-"""Standing waves on a vibrated layer: its surface over place and time, the power of that in wave number and frequency, and their onset.
-
-The drive has the frequency f. A layer that answers each stroke alike has lines at f and its multiples; waves whose crests and troughs
-change places from stroke to stroke have one at f/2, which noise does not have: it is spread over all lines.
-"""
+"""Standing waves on a vibrated layer: its surface over place and time, its power in wave number and frequency, and the onset of waves. A
+layer that answers each stroke of the drive (frequency f) alike has lines at f and its multiples; waves whose crests and troughs change
+places from stroke to stroke have one at f/2; noise is spread over all lines."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -35,11 +32,9 @@ SKIN = 0.3
 
 
 def surface_levels(frame: GrainFrame, length: float, depth: float, diameter: float) -> Array:
-    """Height z (cells,) in m of the surface of a bed that is periodic along x in 0 ... `length` (m) and `depth` (m) along y, in cells
-    about CELL diameters wide: of the centre of the grain down from which the volume of half a layer lies above. NaN in empty cells.
-
-    A cell with less than that volume has the height of its lowest grain.
-    """
+    """Height z (cells,) in m of the surface of a bed that is periodic along x in 0 ... `length` (m) and `depth` (m) along y, in cells about
+    CELL diameters wide: of the centre of the grain down from which the volume of half a layer lies above. NaN in empty cells. A cell with
+    less than that volume has the height of its lowest grain."""
     cells = max(2, round(length / (CELL * diameter)))
     cell = np.floor(frame.positions[:, 0] / length * cells).astype(np.int64) % cells
     order = np.lexsort((-frame.positions[:, 2], cell))
@@ -155,13 +150,10 @@ def amplitude(power: float) -> float:
 
 
 def onset(drive: Array, power: Array, halves: Array, seen: Mask) -> Estimate:
-    """Where the straight line through `power` (n,), with half-widths `halves` of 95 % intervals, over `drive` (n,) comes from zero.
-
-    The square of the amplitude of waves grows so beyond their onset, when they begin without a jump, and no longer where it has its
-    maximum. Points that count are those from the first on from which waves are `seen` (n,) in all, to that maximum. The interval is that
-    of Student for the scatter about the line, or what the intervals of the points make of it, if these are known and that is wider;
-    infinite for fewer than three points.
-    """
+    """Zero of the straight line through `power` (n,), with half-widths `halves` of 95 % intervals, over `drive` (n,): beyond the onset of
+    waves without a jump the square of their amplitude grows linearly, up to its maximum. Points count from the first on from which waves
+    are `seen` (n,) in all, to the maximum. Interval: Student's for the scatter about the line, or that of the points' intervals if it is
+    wider; infinite for fewer than three points."""
     order = np.argsort(drive)
     x, y, half = (np.asarray(values, float)[order] for values in (drive, power, halves))
     below = np.flatnonzero(~np.asarray(seen, bool)[order])
@@ -193,14 +185,3 @@ def order_onset(drive: Array, ordered: Mask) -> Estimate:
         return Estimate(math.nan, math.inf, "waves are not ordered at the highest level")
     low, high = x[without[-1]], x[without[-1] + 1]
     return Estimate(float(0.5 * (low + high)), float(0.5 * (high - low)), "two neighbouring levels")
-
-
-def rank_correlation(x: Sequence[float] | Array, y: Sequence[float] | Array) -> float:
-    """Spearman's rank correlation, equal values with their mean rank: 1 where y always grows with x, -1 where it always falls."""
-    def ranks(values: Sequence[float] | Array) -> Array:
-        table = np.asarray(values, float)
-        return np.asarray(((table[:, None] > table).sum(axis=1) + (table[:, None] >= table).sum(axis=1)) / 2.0)
-
-    one, other = (ranks(values) - ranks(values).mean() for values in (x, y))
-    size = math.sqrt(float(one @ one) * float(other @ other))
-    return float(one @ other) / size if size > 0.0 else 0.0

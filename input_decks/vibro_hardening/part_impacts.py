@@ -1,8 +1,6 @@
-"""Impacts on a clamped part, from a record of all grains that touch it every few steps: how often, how hard, and what friction does.
-
-The record touches.dump has frames `stride` steps apart, with the grains that the part pushes in that step. An impact begins in a frame
-whose predecessor does not have the grain, and ends with the last frame that does.
-"""
+"""Impacts on a clamped part, from a record of all grains that touch it every few steps: how often, how hard, and what friction does. The
+record touches.dump has frames `stride` steps apart, with the grains that the part pushes in that step. An impact begins in a frame whose
+predecessor does not have the grain, and ends with the last frame that does."""
 
 from __future__ import annotations
 

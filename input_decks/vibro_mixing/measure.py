@@ -1,7 +1,5 @@
 """Mixing and segregation in a vibrated vessel, at one phase of each period, at which the bed lies on the floor."""
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,35 +7,13 @@ from dembark.input_decks.common.drive_levels import acceleration
 from dembark.input_decks.common.drive_phases import Phases, read_phases
 from dembark.input_decks.common.estimates import over_chaotic
 from dembark.input_decks.common.momentum import unexplained
-from dembark.postproc.measurement import (
-    Array,
-    Curve,
-    Estimate,
-    Measurement,
-    Numbers,
-    Replica,
-    Replicas,
-    Value,
-    exact,
-    over_replicas,
-    profile,
-)
-from dembark.postproc.replica import once
+from dembark.postproc.measurement import Curve, Measurement, Numbers, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.replica import Array, Replica, once
 
-from .mixing import (
-    Kinds,
-    cells,
-    lacey_index,
-    lower_half,
-    mixing_rate,
-    rate,
-    samples,
-    segregation,
-    wall_drift,
-)
+from .mixing import SAMPLE, Kinds, cells, lacey_index, lower_half, mixing_rate, rate, samples, segregation, wall_drift
 
-# Width of a sample in mean diameters; labellings at random; phase at which the bed lies on the floor.
-SAMPLE, LABELLINGS, PHASE = 3.0, 16, 0
+# Labellings at random; phase at which the bed lies on the floor.
+LABELLINGS, PHASE = 16, 0
 
 
 @once
@@ -73,8 +49,8 @@ def measure(replicas: Replicas) -> Measurement:
 def equal(tracks: list[Array], diameter: float) -> tuple[dict[str, Value], list[Curve]]:
     """Mixing of the halves, and what labels make of the same places."""
     random = np.random.default_rng(0)
-    indices = {name: [index_of(track, lower_half(track[0, :, axis]), diameter) for track in tracks]
-               for axis, name in enumerate(("sides", "layers"))}
+    indices = {name: [np.array([lacey_index(lower_half(track[0, :, axis]), sampled(frame, diameter)) for frame in track])
+                      for track in tracks] for axis, name in enumerate(("sides", "layers"))}
     separated = [max(abs(lacey_index(lower_half(frame[:, axis]), sampled(frame, diameter))) for axis in (0, 1))
                  for track in tracks for frame in track]
     labels = [lacey_index(shuffled(random, lower_half(frame[:, 0])), sampled(frame, diameter))
@@ -102,23 +78,18 @@ def sampled(frame: Array, diameter: float) -> NDArray[np.int64]:
                                 for place, edge in zip(frame.T, cells(frame, SAMPLE * diameter), strict=True)))
 
 
-def index_of(track: Array, kinds: Kinds, diameter: float) -> Array:
-    """Lacey's index (periods,) of grains of two kinds on their `track` (periods, n, 2)."""
-    return np.array([lacey_index(kinds, sampled(frame, diameter)) for frame in track])
-
-
 def unequal(tracks: list[Array], large: list[Kinds], p: Numbers) -> tuple[dict[str, Value], list[Curve]]:
     """How large and small grains part, or how the single large one rises."""
     if p["mixture"] == "intruder":
         heights = [(track[:, kinds, 1].mean(axis=1) - track[:, :, 1].min(axis=1)) / p["grain_diameter"]
                    for track, kinds in zip(tracks, large, strict=True)]
         tops = [(track[:, :, 1].max(axis=1) - track[:, :, 1].min(axis=1)) / p["grain_diameter"] for track in tracks]
-        values = {"rise": Value(over(heights, lambda one: float(one[-1] - one[0]))),
+        values = {"rise": Value(over_chaotic(float(one[-1] - one[0]) for one in heights)),
                   "rise_rate": Value(over_replicas([rate(until_top(*one, p["size_ratio"])) for one in zip(heights, tops, strict=True)]))}
         return values, [curve("rise", "Height of the large grain", "height over the lowest grain (d)", heights)]
     parted = [np.array([segregation(kinds, frame[:, 1]) for frame in track]) for track, kinds in zip(tracks, large, strict=True)]
-    values = {"segregation_start": Value(over(parted, lambda one: float(one[0]))),
-              "segregation_end": Value(over(parted, lambda one: float(one[-1]))),
+    values = {"segregation_start": Value(over_chaotic(float(one[0]) for one in parted)),
+              "segregation_end": Value(over_chaotic(float(one[-1]) for one in parted)),
               "segregation_rate": Value(over_replicas([rate(one) for one in parted]))}
     if acceleration(p) < 1.0:
         change = max((float(one[-1] - one[0]) for one in parted), key=abs)
@@ -130,11 +101,6 @@ def until_top(heights: Array, tops: Array, ratio: float) -> Array:
     """The part of `heights` (periods,) before the large grain is within two of its diameters of the `tops`."""
     there = np.flatnonzero(heights > tops - 2.0 * ratio)
     return heights[: int(there[0])] if len(there) else heights
-
-
-def over(series: list[Array], number: Callable[[Array], float]) -> Estimate:
-    """A number of each run's series, over the runs."""
-    return over_chaotic(number(one) for one in series)
 
 
 def curve(name: str, title: str, across: str, series: list[Array]) -> Curve:

@@ -1,8 +1,6 @@
 """Mixing and segregation of grains of two kinds: Lacey's index, how far apart the kinds are in height, how fast either changes, and the
-drift beside the walls that carries grains round.
-
-`kinds` (n,) is true for the grains of one kind; they may be of one material, told apart by where they once were.
-"""
+drift beside the walls that carries grains round. `kinds` (n,) is true for the grains of one kind; they may be of one material, told apart
+by where they once were."""
 
 from __future__ import annotations
 
@@ -37,14 +35,10 @@ def cells(places: Array, width: float) -> tuple[Array, ...]:
 
 
 def lacey_index(kinds: Kinds, sample: NDArray[np.int64]) -> float:
-    """Lacey's index (sigma_0^2 - sigma^2) / (sigma_0^2 - sigma_r^2) of grains of two `kinds` (n,) in samples
-    with the numbers `sample` (n,).
-
-    sigma^2: mean square of the deviation of the share of one kind in a sample from that in all grains, p, each sample counted as often
-    as it has grains; sigma_0^2 = p (1 - p), where each sample has one kind only (index 0); sigma_r^2 = sigma_0^2 / n for random labels
-    (index 1, but for 1/N), with n grains a sample in the mean. P. M. C. Lacey, J. Appl. Chem. 4 (1954) 257. NaN for a single kind, or one
-    grain a sample.
-    """
+    """Lacey's index (sigma_0^2 - sigma^2) / (sigma_0^2 - sigma_r^2) of grains of two `kinds` (n,) in samples with the numbers `sample`
+    (n,). sigma^2: variance of the share of one kind in the samples, weighted by their grains; sigma_0^2 = p (1 - p), unmixed (index 0);
+    sigma_r^2 = sigma_0^2 / n, random (index 1), n: mean number of grains a sample. P. M. C. Lacey, J. Appl. Chem. 4 (1954) 257. NaN for a
+    single kind, or one grain a sample."""
     total = np.bincount(sample)
     used = total > 0
     share = np.bincount(sample, kinds)[used] / total[used]
@@ -95,12 +89,9 @@ def mixing_rate(index: Array) -> Estimate:
 
 
 def wall_drift(run: Phases, low: float, high: float, diameter: float) -> Estimate:
-    """Mean vertical way in a period, in mean diameters, of the grains within BESIDE diameters of the walls x = `low` and x = `high` (m),
-    less that of all grains; negative where grains go down beside the walls and up between them. Interval from blocks of time.
-
-    A grain that is there at one end of the period only counts half: those that are there at its beginning have a mean way also where
-    nothing circulates, when grains wander faster at some heights than at others, and of a run backwards it must be the opposite.
-    """
+    """Mean vertical displacement in a period, in mean diameters, of the grains within BESIDE diameters of the walls x = `low` and x =
+    `high` (m), less that of all grains; negative: down at the walls. Interval from blocks of time. A grain that is there at one end of the
+    period only counts half: otherwise grains that wander would have a mean displacement without circulation."""
     ways = run.displacements()[::PHASES, :, 2] / diameter
     places = np.array([frame.positions[:, 0] for frame in run.frames[::PHASES]])
     near = np.minimum(places - low, high - places) < BESIDE * diameter

@@ -21,9 +21,10 @@ def setup(p: Parameters) -> Setup:
     step, numbers = fixed_phases(frequency, suitable_step(p, speed), still + math.ceil(p.motion_ramp), p.periods, rows=2)
     biggest = packing.largest(p) * (1.0 if p.mixture == "equal" else p.size_ratio)
     reach = amplitude(p)
-    sites, height = bed(p, biggest)
+    margin = 0.15 * biggest
+    sites, height = packing.slab(p, p.vessel_width, p.vessel_depth, margin, foot=margin, rows=p.dimensions == 2, size=biggest)
     # Grains thrown off the surface fly no higher than this.
-    top = height + 4.0 * reach + 0.5 * (2.0 * speed) ** 2 / p.gravity
+    top = height + margin + 4.0 * reach + 0.5 * (2.0 * speed) ** 2 / p.gravity
     box = [(-biggest, p.vessel_width + biggest), (0.0, p.vessel_depth), (-reach - 2.0 * biggest, top + 2.0 * biggest + reach)]
     grains = packing.grains(p, sites, box)
     if p.dimensions == 2:
@@ -32,15 +33,6 @@ def setup(p: Parameters) -> Setup:
     grains = replace(grains, diameters=np.where(large, p.size_ratio, 1.0) * grains.diameters)
     walls = {"vessel": vessel(p, reach, top)}
     return Setup(numbers["steps"], step, grains, {**numbers, **contacts(p, skin=0.2)}, walls, {"motion_words": moving.words})
-
-
-def bed(p: Parameters, biggest: float) -> tuple[packing.Array, float]:
-    """Sites (n, 3) in m of a dilute bed in the vessel, in which grains of the diameter `biggest` (m) have room, and its height (m)."""
-    least, margin = 1.15 * biggest, 0.15 * biggest
-    n_x, n_y = int((p.vessel_width - 2.0 * margin) / least), int(p.vessel_depth / least) if p.dimensions == 3 else 1
-    rows = math.ceil(1.3 * p.grain_count / (n_x * n_y))
-    cell = ((p.vessel_width - 2.0 * margin) / n_x, p.vessel_depth / n_y, least)
-    return packing.lattice((n_x, n_y, rows), cell, (margin, 0.0, margin)), rows * least + margin
 
 
 def large_grains(p: Parameters, grains: packing.Packing) -> NDArray[np.bool_]:
