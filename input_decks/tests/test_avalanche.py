@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +15,7 @@ import pytest
 from dembark.common.errors import DembarkError
 from dembark.input_decks.avalanche.slope_flow import Slope, front_law, mean_power, profile_power
 from dembark.input_decks.common.momentum import imbalance
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names
 from dembark.input_decks.tests.synthetic import account
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.tests.scenes import frame_of
@@ -23,7 +25,6 @@ D, G, DT, EVERY, ROWS = 0.005, 9.81, 1e-5, 10, 400
 ANGLE = math.radians(35.0)
 TAN_DELTA = 0.4
 SINGLE = {"grain_released": 1, "grain_diameter_spread": 0.0, "floor": "strips", "gate_height": 0.0, "obstacle_height": 0.0}
-Verdicts = dict[str, dict[str, Any]]
 
 
 def history(missed: float = 0.0, lost: float = 0.0) -> dict[str, np.ndarray]:
@@ -270,3 +271,16 @@ def test_a_slab_on_a_chute_flows_where_it_is_steep(engine: str, simulate: Any) -
     # Bodies of the periods: nothing leaves them.
     frame = one.grains()[-1]
     assert frame.periodic.tolist() == [True, True, False] and frame.positions[:, 2].min() > -1.2 * D
+
+
+def controls_avalanche(_folder: Path) -> Iterator[Control]:
+    right = judged("avalanche", avalanche.measure([flow()]))
+    yield Control("a hundredth of the damping that is not tallied", right, judged("avalanche", avalanche.measure([flow(lost=0.01)])))
+    yield Control("a contact with the obstacle that is not counted", right, judged("avalanche", avalanche.measure([flow(missed=0.01)])))
+    for kind in ("slides", "stops"):
+        yield Control("friction a hundredth too strong", single(kind), single(kind, friction=0.505))
+    yield Control("a hollow ball", single("rolls"), single("rolls", inertia=2.0 / 3.0))
+    yield Control("a floor that lets the bed slide", bed(1.0, 0.002, 0.22), bed(1.0, 0.2, 0.22))
+    yield Control("a viscous liquid on the chute", bed(1.5, 3.0, 0.4), bed(2.0, 3.0, 0.4))
+    yield Control("a plug that slides down the chute", bed(1.0, 1.0, 0.32), bed(6.0, 1.0, 0.32))
+    yield Control("speeds that grow as the square of the depth", depths(1.5), depths(2.0))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc.tests.scenes import frame_of
 
 chain = module("bead_chain")
@@ -56,3 +58,10 @@ def test_a_known_wave() -> None:
 def test_the_wave_in_an_engine(engine: str, simulate: Any) -> None:
     found = judged("bead_chain", chain.measure([simulate("bead_chain", engine, {"grain_count": 40}, "hit")]))
     assert names(found, "pass") == {"wave_speed", "wave_decay"}, found
+
+
+def controls_bead_chain(_folder: Path) -> Iterator[Control]:
+    right = verdicts()
+    yield Control("spheres a fiftieth too heavy", right, verdicts(heavier=1.02))
+    yield Control("a contact that dissipates part of its energy", right, verdicts(lost=1e-3))
+    yield Control("a spring of Hooke's law", study(1.0 / 6.0), study(0.0))

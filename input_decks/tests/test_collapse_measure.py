@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.column_collapse.measure import PARTS
-from dembark.input_decks.tests.measuring import defaults, judged, module
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module
 from dembark.postproc import DumpError
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.dumps import grains_text, write_times
@@ -167,3 +167,15 @@ def test_order_of_the_step_error(order: float, spread: float, verdict: str) -> N
     # Two ends of a straight line in logarithms, log 4 apart.
     assert one["interval"][1] - order == pytest.approx(np.sqrt(2.0) * spread / np.log(4.0))
     assert curve["place"] == sorted(curve["place"])
+
+
+def controls_column_collapse(folder: Path) -> Iterator[Control]:
+    right = found(replica(folder / "right"))
+    for name, spoil in {
+            "a hundredth of the damping missing from the account": spoiled(normal_viscous=lambda work: 0.99 * work),
+            "gravity doubled in the potential energy": spoiled(potential_energy=lambda energy: 2.0 * energy),
+            "damping that adds energy": spoiled(tangential_viscous=np.negative)}.items():
+        yield Control(name, right, found(replica(folder / name, spoil)))
+    yield Control("a step error of first order", *(judged("column_collapse", column_collapse.study("step", points(order, 0.05),
+                                                                                              "time_step_fraction"))
+                                                    for order in (2.0, 1.0)))

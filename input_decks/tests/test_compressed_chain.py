@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.physics import integrate_adams
 from dembark.postproc.tests.scenes import frame_of
 
@@ -63,3 +63,23 @@ def test_the_engines_follow_the_exact_solution_of_their_scheme(engine: str, simu
     run = simulate("compressed_chain", engine, {"run_steps": 4000}, "fine")
     found = judged("compressed_chain", chain.measure([run]))
     assert names(found, "pass") == {"phase_error", "contact_steps", "position_estimate", "velocity_estimate"}, found
+
+
+def with_integrator(folder: Path, integrate: Any) -> dict[str, Any]:
+    """What is measured with another integrator in the place of Adams'."""
+    chain.integrate_adams = integrate
+    try:
+        return verdicts(folder)
+    finally:
+        chain.integrate_adams = integrate_adams
+
+
+def controls_compressed_chain(folder: Path) -> Iterator[Control]:
+    right, rough = verdicts(folder), verdicts(folder, 0.2)
+    yield Control("a step that is a millionth longer than prescribed", right, verdicts(folder, longer=1.0 + 1e-6))
+    yield Control("a monitor that reports values a twentieth too large", rough, verdicts(folder, 0.2, told=1.05))
+    second = spoiled(lambda step, time: 0.1 * step**2 * time)
+    yield Control("an integrator of second order", right, with_integrator(folder, second))
+    yield Control("an integrator that damps", right, with_integrator(folder, spoiled(lambda _, time: 1e-3 * time)))
+    third = spoiled(lambda step, time: np.where(time == time[-1], step**3, 0.0), late=1e-2)
+    yield Control("an integrator of third order at impacts", right, with_integrator(folder, third))

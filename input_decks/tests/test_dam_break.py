@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc.tests.scenes import frame_of
 from dembark.validation.case.folders import find
 
@@ -110,3 +113,16 @@ def test_the_column_breaks_in_an_engine(engine: str, simulate: Any) -> None:
     rows = one.times()
     # Water leaves the place where it was, and the tank carries it.
     assert rows["potential_energy"][-1] < 0.5 * rows["potential_energy"][0] and rows["tank_fy"].mean() < 0.0
+
+
+def controls_dam_break(_folder: Path) -> Iterator[Control]:
+    right = verdicts()
+    yield Control("a scheme that makes energy", right, verdicts(made=0.05))
+    yield Control("a particle that leaks out", right, verdicts(leaked=1))
+    yield Control("a front that spacing decides", study(0.01), study(0.2))
+    # The second experiment contradicts the first by more than what is allowed: one that does not, of the same front.
+    own = dam.published("martin_moyce")
+    with patch.object(dam, "published", lambda _: own):
+        agreed = study()
+        yield Control("water that is a seventh faster", agreed, study(faster=8.0 / 7.0))
+        yield Control("water that starts late", agreed, study(late=0.4))

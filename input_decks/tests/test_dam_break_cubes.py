@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc.tests.scenes import frame_of
 
 dam = module("dam_break_cubes")
@@ -200,3 +202,17 @@ def test_six_cubes_stand_upright_at_first(engine: str, simulate: Any) -> None:
         assert place[0] == pytest.approx(0.375, abs=p["cube_noise"] + 1e-4)
     heights = sorted(float(rows[f"cube{k}_z"][0]) for k in range(1, 7))
     np.testing.assert_allclose(heights, [0.075, 0.075, 0.075, 0.225, 0.225, 0.375], atol=1e-3)
+
+
+def controls_dam_break_cubes(_folder: Path) -> Iterator[Control]:
+    three, six = verdicts("three"), verdicts("six")
+    for right, cubes in ((three, "three"), (six, "six")):
+        yield Control("cubes that the water carries along 0.12 m too far", right, verdicts(cubes, carried=0.08))
+    yield Control("a stack that falls a tenth of a second late", three, verdicts("three", late=0.1))
+    yield Control("a top cube that jumps", six, verdicts("six", jumps=0.075))
+    yield Control("gaps that water does not enter", six, verdicts("six", shut=True))
+    yield Control("a dry floor", three, verdicts("three", dry=True))
+    yield Control("a particle in a cube", three, verdicts("three", within=1))
+    yield Control("a particle that leaks out", three, verdicts("three", leaked=1))
+    yield Control("a fall that the spacing decides", study(2.19), study(2.17, 1.0))
+    yield Control("a scheme that makes energy", three, verdicts("three", made=0.05))

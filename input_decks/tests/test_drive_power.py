@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +15,7 @@ from scipy.optimize import brentq
 
 from dembark.common.errors import DembarkError
 from dembark.input_decks.drive_power.drive import LONGEST, sticking_block
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc import DumpError
 from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import find
@@ -240,3 +241,13 @@ def test_every_variant_can_be_set_up_in_every_profile(variant: str, profile: str
     """Grains of `quick` are stiff enough for 2 g only, and its window was shorter than what a plate that stops needs."""
     case = find("drive_power")
     assert prepare(case, resolve(case, profile, variant)).packing is not None
+
+
+def controls_drive_power(_folder: Path) -> Iterator[Control]:
+    right = verdicts()
+    yield Control("a plate slower than prescribed", right, verdicts(shaken(told=2.6)))
+    yield Control("a fiftieth of the plate's force lost", right, verdicts(spoiled(plate_work=0.98)))
+    yield Control("a thirtieth of the damping that is not booked", right, verdicts(spoiled(normal_viscous=0.97)))
+    yield Control("a gap of first order", step_study(2.0), step_study(1.0))
+    yield Control("a rise with the square of the speed", rise_study(2, 1.4), rise_study(2, 2.0))
+    yield Control("a rise with the square of the speed", rise_study(3, 1.0), rise_study(3, 2.0))

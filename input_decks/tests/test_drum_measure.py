@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from dembark.input_decks.debarking_drum.drum_impacts import Drum, _along_shell, estimates, read
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc import DumpError
 from dembark.postproc.replica import Replica
 from dembark.postproc.resampling import Array
@@ -173,3 +175,12 @@ def test_power_along_the_shell_adds_up_to_what_is_lost_there(tmp_path: Path) -> 
     patch, duration = 0.3, one.revolutions * one.period
     total = sum(cell.value for cell in _along_shell(one, patch)) * patch * duration
     assert total == pytest.approx(one.loss[one.shell].sum(), rel=1e-12)
+
+
+def controls_debarking_drum(folder: Path) -> Iterator[Control]:
+    # The files here hold no logs to draw.
+    with patch.object(drum, "fields", lambda _: None):
+        right = measured(replica(folder / "right"))
+        for name, change in {"a step that is not solved": {"certificate": 2e-10}, "a hundredth of the energy that vanishes": {"leak": 0.01},
+                             "a drum with a twelfth too much power": {"leak": 0.08}, "gravity 3 % too weak": {"lift": 0.97}}.items():
+            yield Control(name, right, measured(replica(folder / name, **change)))

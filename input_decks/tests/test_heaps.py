@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import pytest
 
 from dembark.input_decks.common.heaps import EDGE, at_rest, flank, front, power_law
 from dembark.input_decks.common.packing import lattice
-from dembark.input_decks.tests.measuring import defaults, judged, module
+from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module
 from dembark.postproc import GrainsDump
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.replica import Replica
@@ -22,7 +22,6 @@ collapse, repose = module("granular_collapse"), module("angle_of_repose")
 ENGINES = find("granular_collapse").engines
 D = 0.005
 WIDTHS = [0.06, 0.085, 0.12]
-Verdicts = dict[str, dict[str, Any]]
 
 
 def block(length: float, top: float, foot: float, depth: float) -> np.ndarray:
@@ -266,3 +265,21 @@ def test_without_friction_nothing_stays_on_the_plate(run: Any) -> None:
     one = run("angle_of_repose", "liggghts", confinement=0.0, static_friction=0.0, rolling_resistance="off")
     heap = one.grains()[-1]
     assert (heap.positions[:, 2] > 0.0).mean() < 0.15
+
+
+def controls_angle_of_repose(folder: Path) -> Iterator[Control]:
+    yield Control("friction off", heap(folder / "right", 28.5), heap(folder / "smooth", 2.0))
+    yield Control("rolling resistance off", heap(folder / "resisting", 28.5), heap(folder / "rolling", 17.0))
+    yield Control("front and rear walls without friction", factor(1.49), factor(1.0))
+    yield Control("rolling resistance without effect on the angle", rolling(0.4), rolling(0.0))
+
+
+def controls_granular_collapse(_folder: Path) -> Iterator[Control]:
+    right = beads(2.0, 3.6, 1.13)
+    yield Control("a column that spreads almost like a fluid", right, beads(2.0, 12.0, 0.4))
+    yield Control("a column that only slumps", right, beads(2.0, 1.5, 1.7))
+
+    def both(low: float, high: float) -> Verdicts:
+        return exponents("low", low) | exponents("high", high)
+
+    yield Control("run-out that grows as the square root of the height, and a height that does not grow", both(1.0, 0.37), both(0.5, 0.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import resolve
@@ -138,3 +139,13 @@ def test_the_friction_of_front_and_rear_walls_slows_the_discharge(decks: Any, tm
         run = hopper.read(one.replica())
         half[ends] = float(np.interp(0.5, run.share, run.times))
     assert half["walls"] > 1.1 * half["periodic"], half
+
+
+def controls_hopper_discharge(_folder: Path) -> Iterator[Control]:
+    right = verdicts()
+    yield Control("a discharge an eighth slower", right, verdicts(faster=0.875))
+    yield Control("steeper slopes remain", right, verdicts(left=0.2))
+    right = judged("hopper_discharge", hopper.study("outlet", points(), "outlet_width"))
+    for name, change in {"the discharge rate of a liquid": {"exponent": 1.0},
+                         "grains as wide as a third of their diameter": {"k": 0.5}}.items():
+        yield Control(name, right, judged("hopper_discharge", hopper.study("outlet", points(**change), "outlet_width")))

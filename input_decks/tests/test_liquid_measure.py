@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.physics.exact import liquid_row
 from dembark.physics.exact.liquid_row import Books
 from dembark.postproc.replica import Replica
@@ -96,3 +96,28 @@ def test_right_books_pass(tmp_path: Path, variant: str) -> None:
 def test_a_bridge_too_many_fails_the_count_alone(tmp_path: Path) -> None:
     assert names(of_run(replica(tmp_path, "cap", lambda table: table.update(bridge_count=table["bridge_count"] + 1))), "fail") == {
         "bridge_count_error"}
+
+
+def dried(table: Table) -> None:
+    """A share of the liquid of each grain goes over the run, and nobody books it."""
+    kept = np.linspace(1.0, 1.0 - 1e-9, len(STEPS))
+    for name in ("liquid_grains", *(f"liquid_{k}" for k in range(1, 6))):
+        table[name] = table[name] * kept
+
+
+def drained(table: Table) -> None:
+    table["liquid_lost"] = table["liquid_lost"] + 1e-9 * table["liquid_grains"]
+
+
+def twice(table: Table) -> None:
+    table["liquid_grains"] = table["liquid_grains"] + table["liquid_1"]
+
+
+def controls_liquid_exchange(folder: Path) -> Iterator[Control]:
+    right = of_run(replica(folder / "right", "limited"))
+    for name, spoil in {"liquid that dries up": dried, "liquid that drains": drained, "a grain that is counted twice": twice}.items():
+        yield Control(name, right, of_run(replica(folder / name, "limited", spoil)))
+    for name, change in {"paths half as wide": {"amplitude": 0.5 * values("limited")["amplitude"]},
+                         "halves returned instead of what was taken": {"liquid_return": "equal"}}.items():
+        wrong = by_the_rule(values("limited", **change), STEPS)
+        yield Control(name, right, of_run(replica(folder / name, "limited", books=wrong)))

@@ -1,14 +1,17 @@
 """The measurements of the cases of logs pass for runs that are right and fail for runs that are not."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dembark.input_decks.common.log_run import LogRun, TouchFrame
 from dembark.input_decks.log_pile.measure import beginning, impact_values, loads, together
-from dembark.input_decks.tests.measuring import defaults, judged, logs, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, logs, module, names
 from dembark.postproc.measurement import Estimate, Value, number
 
 log_pair, log_cradle = (module(name) for name in ("log_pair", "log_cradle"))
@@ -286,3 +289,80 @@ def test_of_checks_without_an_interval_the_worst_pile_counts():
     assert found["energy_balance"].estimate.value == -1e-3 and found["contacts"].verdict == "fail"
     assert found["push"].estimate.basis == "3 replicas" and found["push"].estimate.value == pytest.approx(0.2, abs=1e-3)
     assert together([sound]) == sound
+
+
+def controls_log_cradle(_folder: Path) -> Iterator[Control]:
+    run = cradle_run(time_step=1e-5)
+    right, p = of_cradle(run), run.parameters
+    # Runs by the scheme whose deck had another number than it was asked for.
+    for name, wrong in (("springs half as stiff", {"stiffness": 0.5 * p["stiffness"]}),
+                        ("log 1 a tenth faster", {"velocity": 1.1 * p["velocity"]})):
+        yield Control(name, right, of_cradle(replace(cradle_run(time_step=1e-5, **wrong), parameters=p)))
+    lossless = replace(run, parameters=p | {"theta": 0.5})
+    yield Control("the dissipation of θ = 1 where θ = ½ was set",
+                  of_cradle(cradle_run(time_step=1e-5, theta=0.5)), of_cradle(lossless))
+    pushed = run.velocities.copy()
+    pushed[-1, :, 0] += 0.01
+    yield Control("an external push", right, of_cradle(replace(run, velocities=pushed)))
+    yield Control("a step that is not solved", right, of_cradle(unsolved(run)))
+
+
+def off_centre() -> LogRun:
+    """An impact with an offset, its velocities those of the exact motion."""
+    run = pair_run()
+    p = run.parameters | {"offset": 0.1}
+    moved = run.velocities.copy()
+    moved[:, :, :2] = log_pair.pair(p).motion(run.times, p["lead_time"]).velocities
+    return replace(run, parameters=p, velocities=moved)
+
+
+def orders(theta: float) -> list[dict]:
+    """Points of the study by the scheme with `theta`."""
+    runs = [pair_run(theta=theta, time_step=step) for step in (3.104558833061282e-5, 6.209117666122564e-5, 1.2418235332245128e-4)]
+    return [{"parameters": run.parameters, "quantities": list(of_pair(run).values())} for run in runs]
+
+
+def controls_log_pair(_folder: Path) -> Iterator[Control]:
+    run = pair_run()
+    right, p, history = of_pair(run), run.parameters, dict(run.history)
+    softer = pair_run(stiffness_1=0.5 * p["stiffness_1"], stiffness_2=0.5 * p["stiffness_2"])
+    yield Control("springs half as stiff", right, of_pair(replace(softer, parameters=p)))
+    yield Control("log 1 a tenth faster", right, of_pair(replace(pair_run(velocity_1=1.1 * p["velocity_1"]), parameters=p)))
+    yield Control("the dissipation of θ = 1 where θ = ½ was set",
+                  of_pair(pair_run(theta=0.5)), of_pair(replace(run, parameters=p | {"theta": 0.5})))
+    oblique = off_centre()
+    along, rubbed = np.array([1.0, -1.0])[:, None], oblique.velocities.copy()
+    # The direction across the line of centres at touch: the logs' smooth skins hold each other back along it by a hundredth.
+    motion = log_pair.pair(oblique.parameters).motion(run.times, p["lead_time"])
+    rubbed[-1, :, :2] += 0.01 * along * np.array([-motion.normal[1], motion.normal[0]])
+    yield Control("friction between smooth logs", of_pair(oblique), of_pair(replace(oblique, velocities=rubbed)))
+    pushed = run.velocities.copy()
+    pushed[-1, 1] += [0.0, 1e-9, 0.0]
+    yield Control("an external push", right, of_pair(replace(run, velocities=pushed)))
+    lossy = history | {"dissipated_energy": history["dissipated_energy"] * (1.0 - 1e-6)}
+    yield Control("a millionth of the dissipation missing from the account", right, of_pair(replace(run, history=lossy)))
+    short = run.impacts * np.where(np.arange(11) == 5, 0.99, 1.0)
+    yield Control("an impulse recorded a hundredth too small", right, of_pair(replace(run, impacts=short)))
+    yield Control("a step that is not solved", right, of_pair(unsolved(run)))
+    first, second = orders(1.0), [point | {"parameters": point["parameters"] | {"theta": 1.0}} for point in orders(0.5)]
+    yield Control("a scheme of the other order",
+                  *(judged("log_pair", log_pair.study("any", points, "time_step")) for points in (first, second)))
+
+
+def controls_log_pile(_folder: Path) -> Iterator[Control]:
+    run = stack()
+    right, walls = of_pile(run), run.touches[0].ids[:, 1]
+
+    def kept(contacts: NDArray[np.bool_]) -> LogRun:
+        """The run without some of its contacts."""
+        return replace(run, touches=[replace(one, **{name: getattr(one, name)[contacts] for name in ("ids", "normals", "gaps", "forces",
+                                                                                                     "friction", "places")})
+                                     for one in run.touches])
+
+    yield Control("a ground that carries a fiftieth too little", right, of_pile(stack(lift=0.98)))
+    yield Control("a lost contact with a stake", right, of_pile(kept(walls != -3)))
+    yield Control("half of the contacts lost", right, of_pile(kept(walls < 0)))
+    yield Control("logs that creep", right, of_pile(replace(run, velocities=run.velocities + np.array([0.1, 0.0, 0.0]))))
+    lossy = dict(run.history) | {"dissipated_energy": 0.9 * run.history["dissipated_energy"]}
+    yield Control("a tenth of the dissipation missing from the account", right, of_pile(replace(run, history=lossy)))
+    yield Control("a step that is not solved", right, of_pile(unsolved(run)))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +13,7 @@ import pytest
 
 from dembark.input_decks.common.motion import motion
 from dembark.input_decks.moving_walls.measure import Contact, landings, turned
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc.tests.scenes import frame_of
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import portable, resolve
@@ -128,3 +130,11 @@ def test_a_vessel_that_moves_is_one_at_rest(engine: str, simulate: Any) -> None:
         points.append({"parameters": run.parameters, "profiles": found.profiles})
     found = judged("moving_walls", walls.study("frames", points, "reference_frame"))
     assert names(found, "pass") == {"speed_error", "push_error"}, found
+
+
+def controls_moving_walls(_folder: Path) -> Iterator[Control]:
+    yield Control("a plate that starts a step late", shaken(), shaken(late=1e-4))
+    yield Control("a contact that uses the velocity of the middle of the plate", strip(), strip(arm=0.0))
+    yield Control("a contact that is not counted", bed(), bed(missed=0.01))
+    yield Control("a vessel whose walls do not transfer their velocity", vessels(), vessels(speed=0.1, push=0.1))
+    yield Control("a plate with another phase", bounce(), bounce(phase=0.3))

@@ -1,14 +1,16 @@
 """What is measured of the plug flow finds what was put into synthetic runs, and does not pass what is wrong."""
 
 import json
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
 from dembark.common.errors import RunError
-from dembark.input_decks.tests.measuring import measure
-from dembark.input_decks.tests.synthetic import DIAMETER, plug_flow
+from dembark.input_decks.tests.measuring import Control, dried, measure, measured
+from dembark.input_decks.tests.synthetic import DIAMETER, plug_flow, told
 
 
 def by_name(content):
@@ -63,3 +65,14 @@ def test_a_window_that_hardly_stays_filled_is_told(tmp_path):
     (folder / "replica-1" / "run.json").write_text(json.dumps(record))
     with pytest.raises(RunError, match="of its height stay filled while the plate sinks, use more grains or less travel"):
         measure(folder)
+
+
+def controls_plug_flow(folder: Path) -> Iterator[Control]:
+    flat = {"slip": 0.3, "decay": 0.8}
+    right = measured(plug_flow(folder / "right", **flat))
+    for name, change in {"a core that shears": {"tilt": 0.5},
+                         "gravity 1 % too weak": {"lift": 0.99},
+                         "velocities a twentieth above the displacements": {"faster": 1.05}}.items():
+        yield Control(name, right, measured(plug_flow(folder / name, **flat, **change)))
+    yield Control("a plate a tenth faster than prescribed", right, measured(told(plug_flow(folder / "plate", **flat), base_speed=0.018)))
+    yield dried("plug_flow")

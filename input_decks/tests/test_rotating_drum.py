@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from dembark.input_decks.rotating_drum.drum_profile import read
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import resolve
@@ -175,3 +176,13 @@ def test_all_grains_have_room_and_no_two_touch(variant: str | dict[str, Any]) ->
     assert shell[moving].min() > 0.0
     ends = np.minimum(packed.positions[:, 2], period - packed.positions[:, 2]) - 0.5 * packed.diameters
     assert not ended or ends[moving].min() > 0.0
+
+
+def controls_rotating_drum(_folder: Path) -> Iterator[Control]:
+    right = verdicts()
+    yield Control("a layer that slides as a plug", right, verdicts(power=0.2))
+    yield Control("a wall that slips", right, verdicts(carried=0.85))
+    yield Control("grains that vanish at the toe", verdicts(speed=0.41, variant="other"), verdicts(speed=0.25, variant="other"))
+    right = verdicts(angle=26.1, variant="sunday_smooth")
+    yield Control("grains carried over the top at a low speed", right, verdicts(ring=True, variant="sunday_smooth"))
+    yield Control("grains that fall back at a high speed", verdicts(ring=True, variant="sunday_15"), verdicts(variant="sunday_15"))

@@ -1,6 +1,8 @@
 """What is measured of silos finds what was put into synthetic runs, and does not pass what is wrong."""
 
 import json
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,8 +10,8 @@ import xarray
 
 from dembark.common.errors import RunError
 from dembark.input_decks.silo.janssen import two_parameter
-from dembark.input_decks.tests.measuring import compare, judged, measure, module, names, pair
-from dembark.input_decks.tests.synthetic import DIAMETER, silo
+from dembark.input_decks.tests.measuring import Control, compare, dried, judged, measure, measured, module, names, pair
+from dembark.input_decks.tests.synthetic import DIAMETER, silo, told
 from dembark.physics import capillary_force
 
 SILO = module("silo")
@@ -226,3 +228,19 @@ def test_silo_wall_patches_carry_the_engines_wall_force(measured_silo):
     assert abs(found["wall_force_deviation"]["value"]) < 1e-6
     held = np.isfinite(fields.wall_normal.values)
     assert fields.wall_shear.values[held].sum() == pytest.approx(0.25 * fields.wall_normal.values[held].sum(), rel=1e-6)
+
+
+def controls_silo(folder: Path) -> Iterator[Control]:
+    right = measured(silo(folder / "right", noise=0.01))
+    for name, change in {"an almost liquid: hardly any friction of the wall": {"friction": 0.005, "stated": 0.25},
+                         "K of the contacts 20 % too high": {"inner": 1.2}, "K of the contacts 20 % too low": {"inner": 0.8},
+                         "a wall ten times as smooth in its lower half": {"smooth": 0.1},
+                         "a lost contact in each layer": {"lost_contacts": 1},
+                         "a fiftieth of the wall's force lost": {"lost_wall_force": 0.02}}.items():
+        yield Control(name, right, measured(silo(folder / name, noise=0.01, **change)))
+    yield Control("gravity doubled", right, measured(told(silo(folder / "gravity", noise=0.01), gravity=2.0 * 9.81)))
+    one_calibrates = study()[0]
+    for name, change in {"other silos that are almost liquid": {"others": 1e-3},
+                         "gravity doubled in other silos": {"heavier": 2.0}}.items():
+        yield Control(name, one_calibrates, study(**change)[0])
+    yield dried("silo")

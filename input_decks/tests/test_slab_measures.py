@@ -1,9 +1,13 @@
 """What is measured of plane silo and gravity-driven channel finds what was put into synthetic runs, and does not pass what is wrong."""
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import judged, measure, module
+from dembark.input_decks.tests.measuring import Control, Verdicts, judged, measure, measured, module
+from dembark.input_decks.tests.synthetic import told
 from dembark.input_decks.tests.synthetic_slabs import gravity_channel, plane_silo
 
 CHANNEL = module("gravity_channel")
@@ -105,3 +109,32 @@ def test_the_common_exponential_of_curves():
     place = np.linspace(0.5, 4.0, 20)
     assert CHANNEL.common_exponential([(place, 1.3 * np.exp(-place)), (2 * place, 1.3 * np.exp(-2 * place))]) == pytest.approx((1.3, 0.0))
     assert CHANNEL.common_exponential([(place, 1.3 * np.exp(-place)), (place, np.exp(-2 * place))])[1] > 0.1
+
+
+def widths(folder: Path, slips: tuple[float, ...]) -> Verdicts:
+    """The study of three widths with these velocities at the wall."""
+    points = [measure(gravity_channel(folder, cells=cells, variant=f"w{cells}", slip=slip, decay=0.1 * cells, noise=0.005, seed=cells))
+              for cells, slip in zip((20, 30, 40), slips, strict=True)]
+    return judged("gravity_channel", CHANNEL.study("width", points, "channel_width"))
+
+
+def controls_gravity_channel(folder: Path) -> Iterator[Control]:
+    right = measured(gravity_channel(folder / "right"))
+    yield Control("the parabolic profile of a fluid", right, measured(gravity_channel(folder / "fluid", slip=0.0, decay=6.0)))
+    yield Control("walls with nine tenths of the friction", right, measured(gravity_channel(folder / "walls", friction=0.9)))
+    yield Control("a slip that does not grow with the width", widths(folder / "grown", (2.0, 2.0, 2.0)),
+                  widths(folder / "same", (2.4, 2.0, 1.6)))
+
+
+def controls_plane_silo(folder: Path) -> Iterator[Control]:
+    right = measured(plane_silo(folder / "right", noise=0.01))
+    for name, change in {"an almost liquid: hardly any friction of the wall": {"friction": 0.004, "stated": 0.2},
+                         "a wall ten times as smooth in its lower half": {"smooth": 0.1},
+                         "a lost contact in each layer": {"lost_contacts": 1},
+                         "a fiftieth of the wall's force lost": {"lost_wall_force": 0.02}}.items():
+        yield Control(name, right, measured(plane_silo(folder / name, noise=0.01, **change)))
+    yield Control("gravity doubled", right, measured(told(plane_silo(folder / "gravity", noise=0.01), gravity=2.0 * 9.81)))
+    # A column deep enough to feel K.
+    deep = measured(plane_silo(folder / "deep", noise=0.01, friction=0.5))
+    for name, inner in (("K of the contacts 20 % too high", 1.2), ("K of the contacts 20 % too low", 0.8)):
+        yield Control(name, deep, measured(plane_silo(folder / name, noise=0.01, friction=0.5, inner=inner)))

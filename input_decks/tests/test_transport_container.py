@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.input_decks.tests.synthetic import account
 from dembark.input_decks.transport_container.measure import ring_period, slid, tops
 from dembark.postproc.tests.scenes import frame_of
@@ -184,3 +186,11 @@ def test_a_deep_bed_does_not_buckle_out_of_its_plane(engine: str, simulate: Any)
                                                    "frames": 11}, "tilt")
     frame = one.grains()[-1]
     assert len(frame.ids) == one.derived["grain_count"] and np.abs(frame.positions[:, 1]).max() < 1e-12 * D
+
+
+def controls_transport_container(_folder: Path) -> Iterator[Control]:
+    right = verdicts()
+    yield Control("a hundredth of the damping that is not tallied", right, verdicts(lost=0.01))
+    yield Control("a wall's contact that is not counted", right, verdicts(missed=0.01))
+    yield Control("a bed that resonates with a slow pulse", pulses(1.0), pulses(1.2))
+    yield Control("a bed that begins to slide at half the slope", onset(0.4), onset(0.2))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +14,7 @@ import pytest
 from dembark.input_decks.common.drive_levels import levels
 from dembark.input_decks.common.momentum import unexplained
 from dembark.input_decks.common.vibration import PHASES
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.input_decks.vibrated_layer.layer import read
 
 layer = module("vibrated_layer")
@@ -227,3 +227,15 @@ def test_blocked_grains_do_not_turn(engine: str, simulate: Any) -> None:
 def test_a_floor_of_strips_is_refused_where_facets_have_no_periods(decks: Any, tmp_path: Path) -> None:
     refused = decks("vibrated_layer", "yade", tmp_path / "strips", SMALL | {"floor": "strips"})
     assert refused.start().wait(60) != 0 and "floor 'strips': facets have no periods here" in refused.said()
+
+
+def controls_vibrated_layer(_folder: Path) -> Iterator[Control]:
+    waves = verdicts(motion_frequency=FAST)
+    yield Control("a billionth of the works that nothing explains", waves, verdicts(lost=1e-9, motion_frequency=FAST))
+    yield Control("waves on a layer that should be flat", verdicts(lambda _: 0.0, noise=0.1, motion_gamma=1.5),
+                  verdicts(lambda _: 0.3, noise=0.1, motion_gamma=1.5))
+    yield Control("a surface that answers each stroke alike", waves, verdicts(part=1.0, motion_frequency=FAST))
+    yield Control("ordered waves that begin at the acceleration of free fall and a half", sweep(2.5), sweep(2.0))
+    yield Control("waves twice as long, at another part of the frequency, than published", panel(5, 0.5), panel(2, 0.25))
+    yield Control("one wave on any length", lengths(12.5, 12.5, 14.3), lengths(12.5, 18.75, 25.0))
+    yield Control("changes that change nothing", shifts(sweep_smooth=-0.2), shifts())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +18,7 @@ from dembark.input_decks.common.momentum import CONTACT_PARTS
 from dembark.input_decks.common.trough import sites_within
 from dembark.input_decks.common.trough import trough as trough_mesh
 from dembark.input_decks.common.vibratory_trough import Trough, read
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.input_decks.tests.synthetic_bed import trough
 from dembark.postproc.replica import Replica
 from dembark.postproc.walls.mesh import cut, read_stl
@@ -185,3 +186,14 @@ def test_a_trough_of_other_places_or_units_is_refused(own_machine: tuple[Path, A
     (folder / "trough.stl").write_bytes(stl("trough", triangles))
     with pytest.raises(DembarkError, match=line):
         sizes()
+
+
+def controls_vibro_finishing(folder: Path) -> Iterator[Control]:
+    folder.mkdir(exist_ok=True)
+    run = trough(folder, noise=5e-5)
+    right = measured(run, **GRAIN)
+    yield Control("a hundredth of the damping that is not booked", right, measured(run, 0.99, **GRAIN))
+    yield Control("a part that is held", right, measured(trough(folder, noise=5e-5, still=True), **GRAIN))
+    yield Control("a bed that turns the same way whatever the drive", sense_study(), sense_study(0.01, 0.01, 0.01))
+    yield Control("a bed that turns faster with every halving of the step",
+                  step_study(0.01, 0.0101, 0.0102), step_study(0.01, 0.012, 0.014))

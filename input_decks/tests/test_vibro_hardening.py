@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +13,7 @@ import pytest
 
 from dembark.input_decks.common import vibratory_trough
 from dembark.input_decks.common.trough import polygon
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.input_decks.tests.synthetic_bed import PERIOD, PERIODS, trough
 from dembark.input_decks.tests.test_vibro_finishing import account
 from dembark.input_decks.vibro_hardening.part_impacts import ContactRecord, nearest, read_record
@@ -122,3 +123,12 @@ def test_grains_hammer_the_part_and_nothing_is_missed(engine: str, simulate: Any
     assert names(found, "pass") == {"energy_balance", "touch_balance"}, found
     assert found["impact_rate"]["value"] > 10.0 and 1e-4 < found["impact_energy"]["value"] < 4.0
     assert found["friction_power"]["value"] > 0.0
+
+
+def controls_vibro_hardening(folder: Path) -> Iterator[Control]:
+    folder.mkdir(exist_ok=True)
+    right = measured(folder / "right")
+    yield Control("a hundredth of the damping that is not booked", right, measured(folder / "booked", 0.99))
+    yield Control("a tenth of the touches lost", right, measured(folder / "lost", lost=6))
+    yield Control("a bed that is calmer at 10 mm than at 2 mm", amplitude_study(1.0, 3.0), amplitude_study(1.0, 0.8))
+    yield Control("impacts that grow with every halving of the step", step_study(0.01, 0.0101, 0.0102), step_study(0.01, 0.012, 0.014))

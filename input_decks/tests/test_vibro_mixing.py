@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +13,7 @@ import pytest
 
 from dembark.input_decks.common.momentum import unexplained
 from dembark.input_decks.common.vibration import PHASES
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import resolve
@@ -111,3 +113,18 @@ def test_the_vessel_moves_as_a_whole_and_keeps_its_grains(engine: str, simulate:
         assert len(frame.ids) == 60 and np.ptp(frame.positions[:, 1]) == 0.0 and (frame.velocities[:, 1] == 0.0).all()
         assert (frame.positions[:, 0] > 0.9 * frame.radii).all() and (frame.positions[:, 0] < 0.05 - 0.9 * frame.radii).all()
     assert judged("vibro_mixing", mixing.measure([run]))["energy_balance"]["verdict"] == "pass"
+
+
+def controls_vibro_mixing(_folder: Path) -> Iterator[Control]:
+    right = verdicts()
+    yield Control("a billionth of the works that nothing explains", right, verdicts(lost=1e-9))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mixing, "sampled", lambda frame, _: np.arange(len(frame)) % 7)
+        yield Control("samples of grains from everywhere", right, verdicts())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mixing, "shuffled", lambda _, kinds: kinds)
+        yield Control("labels that follow the place", right, verdicts(swaps=0))
+    weak = {"swaps": 0, "mixture": "two_sizes", "motion_gamma": 0.8}
+    yield Control("large grains that rise in a vessel that never throws them", verdicts(**weak), verdicts(**weak, rising=0.02))
+    smooth = {"swaps": 0, "wall_friction": 0.0}
+    yield Control("smooth walls that drag", verdicts(**smooth), verdicts(**smooth, drift=-0.1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc.tests.scenes import frame_of
 from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import find
@@ -186,3 +187,21 @@ def test_a_run_that_goes_on_is_the_same(engine: str, scene: str, short: Any, eve
     assert "dembark: resumed at step" in resumed.run(restart_every=every, resume="yes")
     for name in ("time.csv", "grains.dump"):
         assert (whole.folder / name).read_text() == (resumed.folder / name).read_text()
+
+
+def controls_water_tank(_folder: Path) -> Iterator[Control]:
+    right = {scene: verdicts(scene) for scene in ("still", "floating", "falling", "cylinder", "slot", "drifting")}
+    yield Control("gravity a fiftieth too strong", right["still"], verdicts("still", heavier=1.02))
+    for scene in ("floating", "cylinder"):
+        yield Control("water a tenth too light", right[scene], verdicts(scene, lighter=0.9))
+    yield Control("a block that falls a seventh slower", right["falling"], verdicts("falling", slower=1.15))
+    yield Control("walls that keep water half a spacing away", right["slot"], verdicts("slot", lost=1.0))
+    yield Control("a block that loses a billionth of its momentum", right["drifting"], verdicts("drifting", braked=1e-9))
+    for name in ("still", "still_wide", "floating", "cylinder", "slot"):
+        yield Control("errors that grow with finer particles", study(name, 0.5), study(name, 2.0))
+    yield Control("a scheme that makes energy", right["still"], verdicts("still", made=0.05))
+    for scene, one in right.items():
+        if scene == "drifting":
+            # Without walls a particle can be missing, but not leak.
+            continue
+        yield Control("a particle that leaks out", one, verdicts(scene, leaked=1))
