@@ -75,15 +75,24 @@ def dried(case: str) -> Control:
     return Control("liquid that dries up", of_run(1.0), of_run(0.999))
 
 
-def compare(folder: Path) -> dict[str, Any]:
-    """Content of the `comparison.json` of a case and variant, which is written."""
-    return as_json(write(folder / COMPARISON, judge.compare(folder)))
+def compared(folder: Path) -> dict[str, dict[str, Any]]:
+    """The quantities of a case and variant with their verdicts on the engines, by name."""
+    return {one["name"]: one for one in as_json(write(folder / COMPARISON, judge.compare(folder)))["quantities"]}
 
 
 def pair(*entries: Mapping[str, Any], engines: tuple[str, str] = ("liggghts", "yade")) -> dict[str, Any]:
     """One quantity of two engines from entries of their `metrics.json`, compared."""
     one, other = (from_json(entry, QuantityRecord) for entry in entries)
     return as_json(judge.pair(one, other, *engines))
+
+
+def point(parameters: Mapping[str, Any], values: Mapping[str, float], half: float | None = 0.0, part: float = 0.0, **more: Any) -> Any:
+    """A result for a study: quantities by name, known to `half` and the `part` of themselves; None: without an interval."""
+    def interval(value: float) -> list[float] | None:
+        return None if half is None else [value - half - part * abs(value), value + half + part * abs(value)]
+
+    return {"parameters": dict(parameters), **more,
+            "quantities": [{"name": name, "value": value, "interval": interval(value), "basis": ""} for name, value in values.items()]}
 
 
 def names(found: Verdicts, verdict: str) -> set[str]:

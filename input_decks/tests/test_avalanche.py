@@ -15,9 +15,8 @@ import pytest
 from dembark.common.errors import DembarkError
 from dembark.input_decks.avalanche.slope_flow import Slope, front_law, mean_power, profile_power
 from dembark.input_decks.common.momentum import imbalance
-from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names, point
 from dembark.input_decks.tests.synthetic import account
-from dembark.postproc.measurement import Measurement
 from dembark.postproc.tests.scenes import frame_of
 
 avalanche = module("avalanche")
@@ -97,27 +96,21 @@ def single(kind: str, *, friction: float = 0.5, inertia: float = 0.4) -> Verdict
     return judged("avalanche", avalanche.measure([run]))
 
 
-def flowing(power: float, speed: float, angle: float) -> Measurement:
-    """A bed 20 d deep on a chute of this angle (rad) whose velocity is `speed` (√(g d)) [1 − (1 − z/H)^`power`]."""
+def bed(power: float, speed: float, angle: float) -> Verdicts:
+    """What is measured of a bed 20 d deep on a chute of this angle (rad) whose velocity is `speed` (√(g d)) [1 − (1 − z/H)^`power`]."""
     z = D * (np.arange(20.0) + 0.5)
     places = np.array([(x, 0.0, height) for x in D * np.arange(20.0) for height in z])
     u = speed * math.sqrt(G * D) * (1.0 - (1.0 - places[:, 2] / (20.0 * D)) ** power)
     frames = [replace(frame_of(places, 0.5 * D, step=1000 * k), velocities=np.column_stack([u, 0.0 * u, 0.0 * u])) for k in range(20)]
     run = SimpleNamespace(parameters=defaults("avalanche", bed_height=20.0, slope_angle=angle), derived={}, time_step=DT, times=history,
                           grains=lambda: frames)
-    return avalanche.measure([run])
-
-
-def bed(power: float, speed: float, angle: float) -> Verdicts:
-    """What is measured of a bed that is `flowing`."""
-    return judged("avalanche", flowing(power, speed, angle))
+    return judged("avalanche", avalanche.measure([run]))
 
 
 def depths(power: float) -> Verdicts:
     """What the study makes of mean speeds that grow with this power of the depth."""
-    given = [{"parameters": defaults("avalanche", bed_height=depth), "quantities": [
-        {"name": name, "value": value, "interval": [0.99 * value, 1.01 * value], "basis": ""}
-        for name, value in (("bed_depth", depth), ("mean_speed", depth**power))]} for depth in (20.0, 10.0, 14.0, 28.0)]
+    given = [point(defaults("avalanche", bed_height=depth), {"bed_depth": depth, "mean_speed": depth**power}, part=0.01)
+             for depth in (20.0, 10.0, 14.0, 28.0)]
     return judged("avalanche", avalanche.study("depth", given, "bed_height"))
 
 
@@ -137,40 +130,16 @@ def test_a_known_flow_is_measured_as_it_is() -> None:
     assert value["passed"] == pytest.approx(15.0 / 20.0) and value["obstacle_impulse"] == pytest.approx(-1.5, rel=0.02)
 
 
-def test_what_is_not_counted_is_seen() -> None:
-    assert names(judged("avalanche", avalanche.measure([flow(missed=1e-5)])), "fail") == {"obstacle_impulse"}
-    assert names(judged("avalanche", avalanche.measure([flow(lost=1e-8)])), "fail") == {"energy_balance"}
-    assert imbalance(history()) < 1e-15
-
-
 @pytest.mark.parametrize("kind", ["slides", "rolls", "stops"])
 def test_single_grains_move_as_mechanics_says(kind: str) -> None:
     checked = "stopping_distance" if kind == "stops" else "slope_acceleration"
     assert names(single(kind), "pass") == {"energy_balance", checked}
-    assert names(single(kind, friction=0.505), "fail") == (set() if kind == "rolls" else {checked})
-    assert names(single(kind, inertia=2.0 / 3.0), "fail") == ({checked} if kind == "rolls" else set())
 
 
-@pytest.mark.parametrize(("power", "angle", "verdict"), [
-    (1.5, 0.4, "pass"), (1.0, 0.4, "fail"), (2.0, 0.4, "fail"), (1.0, 0.32, "pass"), (1.5, 0.32, "fail"), (6.0, 0.32, "fail")])
+@pytest.mark.parametrize(("power", "angle", "verdict"), [(1.5, 0.4, "pass"), (1.0, 0.4, "fail"), (1.0, 0.32, "pass"), (1.5, 0.32, "fail")])
 def test_profiles_of_the_regimes(power: float, angle: float, verdict: str) -> None:
     one = bed(power, 3.0, angle)["profile_power"]
-    assert one["value"] == pytest.approx(min(power, 3.99), abs=0.06 * power) and one["verdict"] == verdict
-
-
-def test_profiles_have_the_height_upward() -> None:
-    (shown,) = flowing(1.5, 3.0, 0.4).profiles
-    assert shown["vertical"] and (shown["along"], shown["across"]) == ("z / H", "speed over √(g d)")
-
-
-def test_a_bed_at_rest() -> None:
-    assert bed(1.0, 0.002, 0.22)["rest_speed"]["verdict"] == "pass" and bed(1.0, 0.2, 0.22)["rest_speed"]["verdict"] == "fail"
-
-
-@pytest.mark.parametrize(("power", "verdict"), [(1.5, "pass"), (1.0, "fail"), (2.0, "fail")])
-def test_speeds_grow_with_the_depth(power: float, verdict: str) -> None:
-    one = depths(power)["speed_power"]
-    assert one["value"] == pytest.approx(power) and one["verdict"] == verdict
+    assert one["value"] == pytest.approx(power, abs=0.06 * power) and one["verdict"] == verdict
 
 
 def test_places_along_the_floor() -> None:
@@ -205,16 +174,17 @@ def test_the_power_of_a_profile_with_slip(power: float) -> None:
     assert profile_power(z, 0.3 + 2.0 * (1.0 - (1.0 - z) ** power)) == pytest.approx(power, abs=0.006)
 
 
-def test_the_power_of_a_profile_that_changes_has_an_interval() -> None:
+@pytest.mark.parametrize("seeds", [6, pytest.param(60, marks=pytest.mark.full)])
+def test_the_power_of_a_profile_that_changes_has_an_interval(seeds: int) -> None:
     """Powers that scatter from frame to frame about 1.5: the interval is that of their mean, and holds 1.5 in 19 of 20 cases."""
     z, held, halves = (np.arange(15.0) + 0.5) / 15.0, 0, []
-    for seed in range(60):
+    for seed in range(seeds):
         powers = 1.5 + 0.3 * np.random.default_rng(seed).standard_normal(80)
         speeds = 1.0 - (1.0 - z) ** np.maximum(powers, 0.3)[:, None]
         found = mean_power(z, np.ones((80, 15)), speeds)
         held += abs(found.value - 1.5) < found.half + 0.02  # the mean of profiles has not quite the mean power
         halves.append(found.half)
-    assert held >= 52
+    assert held >= 0.86 * seeds
     assert np.mean(halves) == pytest.approx(2.26 * 0.3 / math.sqrt(80.0), rel=0.25)
     assert mean_power(z, np.ones((6, 15)), np.tile(1.0 - (1.0 - z) ** 1.5, (6, 1))).half >= 0.0
 
@@ -230,7 +200,7 @@ SMALL = {"grain_released": 40, "slope_length": 40.0, "flat_length": 60.0, "gate_
          "settle_time": 0.15, "flow_time": 0.4, "frames": 11}
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+@pytest.mark.parametrize("engine", ["liggghts", *(pytest.param(name, marks=pytest.mark.full) for name in ("yade", "lammps"))])
 @pytest.mark.parametrize("spin", ["free", "blocked"])
 def test_a_small_avalanche(engine: str, spin: str, simulate: Any) -> None:
     # Grains that do not turn stay on a rough slope: they slide on strips.
@@ -248,6 +218,7 @@ def test_a_small_avalanche(engine: str, spin: str, simulate: Any) -> None:
     assert found["obstacle_impulse"]["value"] < 0.0 and 0.15 < found["floor_friction"]["value"] < 0.7
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 def test_grains_that_turn_on_strips_do_not_push_the_gate_out_of_the_plane(engine: str, simulate: Any) -> None:
     frames = list(simulate("avalanche", engine, {"flow_time": 0.2, "frames": 11}, "smooth").grains())

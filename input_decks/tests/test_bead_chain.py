@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.postproc.tests.scenes import frame_of
 
 chain = module("bead_chain")
@@ -41,9 +41,7 @@ def verdicts(**changes: Any) -> dict[str, dict[str, Any]]:
 
 def study(power: float) -> dict[str, dict[str, Any]]:
     """Waves whose speed grows with this power of their force."""
-    points = [{"parameters": {"hit_speed": force}, "quantities": [
-        {"name": name, "value": value, "interval": [value, value]}
-        for name, value in (("peak_force", force), ("velocity", 8.0 * force**power))]} for force in (0.05, 0.4, 2.0)]
+    points = [point({"hit_speed": force}, {"peak_force": force, "velocity": 8.0 * force**power}) for force in (0.05, 0.4, 2.0)]
     return judged("bead_chain", chain.study("force", points, "hit_speed"))
 
 

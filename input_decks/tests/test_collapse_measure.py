@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.column_collapse.measure import PARTS
-from dembark.input_decks.tests.measuring import Control, defaults, judged, module
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, point
 from dembark.postproc import DumpError
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.dumps import grains_text, write_times
@@ -150,12 +150,7 @@ def test_a_high_column_stands_beside_the_experiments_without_a_verdict(tmp_path:
 
 
 def points(order: float, spread: float) -> list[dict[str, Any]]:
-    made = []
-    for step in (0.2, 0.05, 0.1):
-        error = 3e-2 * step**order
-        made.append({"parameters": {"time_step_fraction": step}, "quantities": [
-            {"name": "step_error", "value": error, "interval": [error * (1 - spread), error * (1 + spread)], "basis": "3 replicas"}]})
-    return made
+    return [point({"time_step_fraction": step}, {"step_error": 3e-2 * step**order}, part=spread) for step in (0.2, 0.05, 0.1)]
 
 
 @pytest.mark.parametrize(("order", "spread", "verdict"),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.postproc.tests.scenes import frame_of
 
 dam = module("dam_break_cubes")
@@ -116,9 +116,7 @@ def test_what_bounces_on_the_top_of_a_wall_has_not_leaked() -> None:
 
 def study(last: float, fallen: float = 1.1, standing: float = 0.0) -> dict[str, dict[str, Any]]:
     """x at the end and the time of the fall at 50 and 25 mm as they are, and at 12.5 mm what is given."""
-    points = [{"parameters": {"spacing": spacing}, "quantities": [{"name": "x_end", "value": x, "interval": [x, x]},
-                                                                  {"name": "half_fallen", "value": t, "interval": [t, t]},
-                                                                  {"name": "standing", "value": standing, "interval": [standing] * 2}]}
+    points = [point({"spacing": spacing}, {"x_end": x, "half_fallen": t, "standing": standing})
               for spacing, x, t in ((0.0125, last, fallen), (0.05, 2.24, 1.2), (0.025, 2.2, 1.12))]
     return judged("dam_break_cubes", dam.study("spacing", points, "spacing"))
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import resolve
@@ -63,9 +63,7 @@ def points(exponent: float = 1.5, k: float = 1.5) -> list[dict[str, Any]]:
     for width in (0.01792, 0.025088, 0.03136, 0.04032):
         given = defaults("hopper_discharge", outlet_width=width)
         rate = 1500.0 * np.sqrt(9.81) * 0.03 ** (1.5 - exponent) * (width - k * 0.00224) ** exponent
-        made.append({"parameters": given, "variant": "anand", "quantities": [
-            {"name": name, "value": value, "interval": [0.999 * value, 1.001 * value]}
-            for name, value in (("mass_rate", rate), ("bulk_density", 1500.0))]})
+        made.append(point(given, {"mass_rate": rate, "bulk_density": 1500.0}, part=1e-3, variant="anand"))
     return made
 
 

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.input_decks.common.liquid import liquid_values
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.physics.exact import liquid_row
 from dembark.physics.exact.liquid_row import Books
 from dembark.postproc.replica import Replica
+from dembark.postproc.tests.dumps import write_times
 from dembark.validation.case.folders import find
 
 liquid_exchange = module("liquid_exchange")
@@ -77,7 +79,7 @@ def replica(folder: Path, variant: str, spoil: Callable[[Table], None] = lambda 
                     "liquid_lost": np.zeros(len(steps)), "bridge_count": books.count,
                     **{f"liquid_{k + 1}": column for k, column in enumerate(books.grains.T)}}
     spoil(table)
-    np.savetxt(folder / "time.csv", np.column_stack(list(table.values())), delimiter=",", fmt="%.17g", comments="", header=",".join(table))
+    write_times(folder / "time.csv", table)
     return Replica(folder, {"parameters": p, "time_step": p["time_step"], "engine": "liggghts"})
 
 
@@ -111,6 +113,21 @@ def drained(table: Table) -> None:
 
 def twice(table: Table) -> None:
     table["liquid_grains"] = table["liquid_grains"] + table["liquid_1"]
+
+
+def test_carried_liquid_of_any_case(tmp_path: Path) -> None:
+    steps = np.arange(1, 401)
+    bridges = 0.3 + 0.01 * np.sin(steps)
+    for drift, conserved in ((0.0, True), (1e-11, False)):
+        write_times(tmp_path / "time.csv", {
+            "step": steps, "time": 1e-3 * steps, "kinetic_energy": 0.0 * steps, "liquid_grains": 0.7 - bridges + drift * steps,
+            "liquid_bridges": bridges, "liquid_walls": 0.0 * steps + 0.25, "liquid_lost": 0.0 * steps + 0.05,
+            "bridge_count": 300 + steps % 3})
+        found = liquid_values([Replica(tmp_path, {"parameters": {"liquid_content": 0.01, "grain_count": 100}})])
+        assert (found["liquid_total"].estimate.value < 1e-12) == conserved
+        assert found["bridge_count"].estimate.value == pytest.approx(3.01, abs=0.01)
+        assert found["liquid_in_bridges"].estimate.value == pytest.approx(0.3, abs=0.002)
+    assert liquid_values([Replica(tmp_path, {"parameters": {"liquid_content": 0.0}})]) == {}
 
 
 def controls_liquid_exchange(folder: Path) -> Iterator[Control]:

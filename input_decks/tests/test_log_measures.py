@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dembark.input_decks.common.log_run import LogRun, TouchFrame
+from dembark.input_decks.common.log_run import LogRun, TouchFrame, read_touches
 from dembark.input_decks.log_pile.measure import beginning, impact_values, loads, together
 from dembark.input_decks.tests.measuring import Control, defaults, judged, logs, module, names
+from dembark.postproc import DumpError
 from dembark.postproc.measurement import Estimate, Value, number
 
 log_pair, log_cradle = (module(name) for name in ("log_pair", "log_cradle"))
@@ -53,31 +54,15 @@ def row_of_springs(p, mass, stiffness, place, velocity, steps, stride):
     velocities = vectors(2)
     kinetic = 0.5 * (velocities**2).sum(axis=2) @ mass
     elastic = np.array([0.5 * (frame[4] ** 2 / stiffness).sum() for frame in frames])
-    history = {
-        "step": np.array([frame[0] for frame in frames])[1:],
-        "highest_force": np.array([frame[5] for frame in frames])[1:],
-        "elastic_energy": elastic[1:],
-        "dissipated_energy": (kinetic[0] - kinetic - elastic)[1:],
-        "kinetic_energy": kinetic[1:],
-        **{name: np.zeros(count - 1) for name in ("worst_certificate", "pivots_total", "pivots", "contacts")},
-    }
+    history = {"step": np.array([frame[0] for frame in frames])[1:], "highest_force": np.array([frame[5] for frame in frames])[1:],
+               "elastic_energy": elastic[1:], "dissipated_energy": (kinetic[0] - kinetic - elastic)[1:], "kinetic_energy": kinetic[1:],
+               **{name: np.zeros(count - 1) for name in ("worst_certificate", "pivots_total", "pivots", "contacts")}}
     record = np.array([[1, 2, p.get("lead_time", 0.0), longest * tau, highest, impulse, 1.0, 0.0, 0, 0, 0]])
-    touches = [
-        TouchFrame(
-            frame[0],
-            np.array([[i + 1, i + 2] for i in range(n - 1)]),
-            np.tile([-1.0, 0.0, 0.0], (n - 1, 1)),
-            np.zeros(n - 1),
-            frame[4],
-            np.zeros((n - 1, 3)),
-            np.zeros((n - 1, 3)),
-        )
-        for frame in frames
-    ]
+    pairs, zero = np.array([[i + 1, i + 2] for i in range(n - 1)]), np.zeros((n - 1, 3))
+    touches = [TouchFrame(frame[0], pairs, zero - [1.0, 0.0, 0.0], np.zeros(n - 1), frame[4], zero, zero) for frame in frames]
     times = np.array([frame[0] for frame in frames]) * tau
-    return LogRun(
-        p, tau, times, vectors(1), velocities, np.zeros((count, n, 3)), vectors(3), mass, np.full(n, 0.1), history, record, touches
-    )
+    return LogRun(p, tau, times, vectors(1), velocities, np.zeros((count, n, 3)), vectors(3), mass, np.full(n, 0.1), history, record,
+                  touches)
 
 
 def unsolved(run):
@@ -98,30 +83,13 @@ def of_pair(run):
     return judged("log_pair", logs("log_pair", run))
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"theta": 0.5, "time_step": 1.58e-5},
-        {"mass_1": 20.0, "stiffness_2": 3e7, "velocity_1": 1.5, "velocity_2": -0.2},
-        {"time_step": 3.1e-5},
-    ],
-)
+@pytest.mark.parametrize("changes", [
+    {}, {"theta": 0.5, "time_step": 1.58e-5}, {"mass_1": 20.0, "stiffness_2": 3e7, "velocity_1": 1.5, "velocity_2": -0.2},
+    {"time_step": 3.1e-5}])
 def test_a_pair_by_the_scheme_passes(changes):
     found = of_pair(pair_run(**changes))
     assert not names(found, "fail"), found
     assert {"peak_force", "contact_time", "velocity_1_after", "restitution", "momentum_error", "impulse"} <= names(found, "pass")
-
-
-def test_what_is_wrong_with_a_pair_is_seen():
-    run = pair_run()
-    bent = replace(run, velocities=run.velocities * (1.0 + np.linspace(0.0, 0.01, len(run.times)))[:, None, None])
-    assert {"velocity_2_after", "restitution", "momentum_error", "impulse"} <= names(of_pair(bent), "fail")
-    # The loss of theta = 1 in a run that says it has none.
-    lossy = replace(run, parameters=run.parameters | {"theta": 0.5})
-    assert {"peak_force", "restitution", "velocity_1_after"} <= names(of_pair(lossy), "fail")
-    late = replace(run, impacts=run.impacts * np.where(np.arange(11) == 3, 1.01, 1.0))
-    assert of_pair(late)["contact_time"]["verdict"] == "fail"
 
 
 def test_a_damped_pair_is_shown_beside_the_exact_motion_without_a_verdict():
@@ -134,17 +102,17 @@ def test_a_damped_pair_is_shown_beside_the_exact_motion_without_a_verdict():
     assert found["momentum_error"]["verdict"] == "pass"
 
 
+def orders(theta: float) -> list[dict]:
+    """Points of the study by the scheme with `theta`."""
+    runs = [pair_run(theta=theta, time_step=step) for step in (3.104558833061282e-5, 6.209117666122564e-5, 1.2418235332245128e-4)]
+    return [{"parameters": run.parameters, "quantities": list(of_pair(run).values())} for run in runs]
+
+
 @pytest.mark.parametrize(("theta", "order"), [(1.0, 1.0), (0.5, 2.0)])
 def test_the_study_finds_the_order(theta, order):
-    points = []
-    for step in (3.104558833061282e-5, 6.209117666122564e-5, 1.2418235332245128e-4):
-        run = pair_run(theta=theta, time_step=step)
-        points.append({"parameters": run.parameters, "quantities": list(of_pair(run).values())})
-    found = judged("log_pair", log_pair.study("any", points, "time_step"))
+    found = judged("log_pair", log_pair.study("any", orders(theta), "time_step"))
     assert found["order_peak_force"]["value"] == pytest.approx(order, abs=0.05)
     assert names(found, "pass") == {"order_peak_force", "order_velocity_curve_error"}
-    wrong = [point | {"parameters": point["parameters"] | {"theta": 1.5 - theta}} for point in points]
-    assert names(judged("log_pair", log_pair.study("any", wrong, "time_step")), "fail") == set(found)
 
 
 def cradle_run(**changes):
@@ -160,15 +128,9 @@ def of_cradle(run):
     return judged("log_cradle", logs("log_cradle", run))
 
 
-def test_a_cradle_by_the_scheme_passes_and_another_does_not():
-    run = cradle_run(time_step=1e-5)
-    found = of_cradle(run)
+def test_a_cradle_by_the_scheme_passes():
+    found = of_cradle(cradle_run(time_step=1e-5))
     assert not names(found, "fail"), found
-    bent = run.velocities.copy()
-    bent[-1, 1] += 0.01
-    assert {"velocity_2_after", "scheme_deviation", "momentum_error"} <= names(of_cradle(replace(run, velocities=bent)), "fail")
-    softer = replace(run, parameters=run.parameters | {"stiffness": 1.5e7})
-    assert of_cradle(softer)["peak_force"]["verdict"] == "fail"
 
 
 def stack(*, lift=1.0, count=201, logs=4):
@@ -184,22 +146,12 @@ def stack(*, lift=1.0, count=201, logs=4):
     still = np.zeros((count, logs, 3))
     lost = (mass.sum() * p["gravity"]) * (positions[0, 0, 1] - positions[1:, 0, 1])
     steps = np.arange(count) * 100
-    history = {
-        "step": steps[1:],
-        "kinetic_energy": np.zeros(count - 1),
-        "elastic_energy": np.zeros(count - 1),
-        "dissipated_energy": lost,
-        "worst_certificate": np.full(count - 1, 1e-16),
-        "pivots_total": steps[1:] * 1.0,
-        "pivots": np.ones(count - 1),
-        "contacts": np.full(count - 1, 9.0),
-        "impacts": np.arange(count - 1),
-        "highest_force": np.full(count - 1, 1e4),
-    }
-    rng = np.random.default_rng(1)
-    impacts = np.column_stack(
-        [np.full(30, 1), np.full(30, 2), np.linspace(0.1, 0.4, 30), *rng.uniform(1.0, 2.0, (5, 30)), np.zeros((30, 3))]
-    )
+    every = np.ones(count - 1)
+    history = {"step": steps[1:], "kinetic_energy": 0.0 * every, "elastic_energy": 0.0 * every, "dissipated_energy": lost,
+               "worst_certificate": 1e-16 * every, "pivots_total": steps[1:] * 1.0, "pivots": every, "contacts": 9.0 * every,
+               "impacts": np.arange(count - 1), "highest_force": 1e4 * every}
+    impacts = np.column_stack([np.full(30, 1), np.full(30, 2), np.linspace(0.1, 0.4, 30),
+                               *np.random.default_rng(1).uniform(1.0, 2.0, (5, 30)), np.zeros((30, 3))])
     touches = [TouchFrame(int(step), ids, normals, np.zeros(len(ids)), forces, zero, zero) for step in steps]
     return LogRun(p, 5e-5, steps * 5e-5, positions, still, still, still, mass, np.full(logs, 0.1), history, impacts, touches)
 
@@ -208,22 +160,10 @@ def of_pile(run):
     return judged("log_pile", logs("log_pile", run))
 
 
-def test_a_stack_at_rest_passes_and_one_that_floats_does_not():
-    run = stack()
-    found = of_pile(run)
+def test_a_stack_at_rest_passes():
+    found = of_pile(stack())
     assert not names(found, "fail"), found
     assert {"lift_over_weight", "ground_share", "log_balance", "contacts_per_log", "energy_balance"} <= names(found, "pass")
-    assert {"lift_over_weight", "ground_share", "log_balance"} <= names(of_pile(stack(lift=0.98)), "fail")
-    creeping = replace(run, velocities=run.velocities + np.array([0.1, 0.0, 0.0]))
-    assert of_pile(creeping)["residual_speed"]["verdict"] == "fail"
-    lossy = replace(run, history=dict(run.history) | {"dissipated_energy": 0.9 * run.history["dissipated_energy"]})
-    assert of_pile(lossy)["energy_balance"]["verdict"] == "fail"
-
-
-def test_a_stack_with_too_few_contacts_fails():
-    run = stack()
-    few = [replace(one, ids=one.ids[:4], normals=one.normals[:4], forces=one.forces[:4], friction=one.friction[:4]) for one in run.touches]
-    assert of_pile(replace(run, touches=few))["contacts_per_log"]["verdict"] == "fail"
 
 
 def test_rough_stakes_may_carry_a_part_of_the_weight():
@@ -291,6 +231,17 @@ def test_of_checks_without_an_interval_the_worst_pile_counts():
     assert together([sound]) == sound
 
 
+def test_touches_are_read_and_other_files_refused(tmp_path):
+    head = "ITEM: TIMESTEP\n7\nITEM: NUMBER OF ENTRIES\n1\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\nITEM: ENTRIES "
+    columns = " ".join(f"f_impacts[{i}]" for i in range(1, 14))
+    (tmp_path / "contacts.dump").write_text(head + columns + "\n2 -1 0 1 0 -1e-5 500 3 0 0 0.1 0 0\n")
+    (found,) = read_touches(tmp_path / "contacts.dump")
+    assert (found.step, found.ids.tolist(), found.forces.tolist(), found.friction.tolist()) == (7, [[2, -1]], [500.0], [[3.0, 0.0, 0.0]])
+    (tmp_path / "contacts.dump").write_text(head + "a b c\n1 2 3\n")
+    with pytest.raises(DumpError, match="3 columns instead of 13"):
+        read_touches(tmp_path / "contacts.dump")
+
+
 def controls_log_cradle(_folder: Path) -> Iterator[Control]:
     run = cradle_run(time_step=1e-5)
     right, p = of_cradle(run), run.parameters
@@ -314,12 +265,6 @@ def off_centre() -> LogRun:
     moved = run.velocities.copy()
     moved[:, :, :2] = log_pair.pair(p).motion(run.times, p["lead_time"]).velocities
     return replace(run, parameters=p, velocities=moved)
-
-
-def orders(theta: float) -> list[dict]:
-    """Points of the study by the scheme with `theta`."""
-    runs = [pair_run(theta=theta, time_step=step) for step in (3.104558833061282e-5, 6.209117666122564e-5, 1.2418235332245128e-4)]
-    return [{"parameters": run.parameters, "quantities": list(of_pair(run).values())} for run in runs]
 
 
 def controls_log_pair(_folder: Path) -> Iterator[Control]:

@@ -102,17 +102,6 @@ def test_a_run_without_friction_fails_where_it_matters(engine: str, finished: An
     assert names(studied([run, finer]), "fail") == {name for name, one in CASE.quantities.items() if one.tolerance is not None}
 
 
-@pytest.mark.parametrize(("wrong", "seen"), [
-    (lambda one: replace(one, restitution=0.9 * one.restitution), {"centre_angle_sliding"}),
-    (lambda one: replace(one, g_star=0.5 * one.g_star), {"tangential_restitution_mixed", "spin_mixed"}),
-    (lambda one: replace(one, friction=1.25 * one.friction), {"tangential_restitution_sliding", "spin_sliding"}),
-    (lambda one: replace(one, slide=0.9 * one.slide), {"centre_angle_sliding"}),
-], ids=["restitution", "half the shear stiffness", "friction", "tangential velocity"])
-def test_wrong_physics_is_seen(wrong: Any, seen: set[str]) -> None:
-    assert names(by_scheme(), "fail") == {"sticking"}
-    assert seen <= names(by_scheme(wrong), "fail")
-
-
 def test_measured_spin_and_restitution_contradict_each_other_by_a_velocity() -> None:
     """The figures of reference/README.md."""
     every = {one.name: one for one in oblique.measured()}

@@ -1,4 +1,4 @@
-"""single_contact beside the curves of Chung and Ooi (2011): what agrees with them passes, and wrong physics is seen."""
+"""single_contact beside the curves of Chung and Ooi (2011): what agrees with them passes."""
 
 from __future__ import annotations
 
@@ -22,21 +22,15 @@ single_contact = module("single_contact")
 DIFFERENT = {
     variant: {"published_tangential_restitution"} if variant == "test_4" else set()
     for variant in ("test_1", "test_2", "test_4", "test_5", "test_5_partial_slip", "test_6", "test_8_a", "test_8_b")}
-FORCES = {"published_force_overlap", "published_force_time"}
-CONTROLS = [("test_1", {"youngs_modulus_a": 4.3e10}, FORCES), ("test_2", {"density_a": 2400.0}, {"published_force_time"}),
-            ("test_4", {"friction": 0.08}, {"published_spin"}), ("test_4", {"friction": 0.01}, {"published_spin"}),
-            ("test_4", {"poisson_ratio_a": 0.0}, {"published_spin"}),
-            ("test_5_partial_slip", {"presliding": "linear"}, {"finite_elements_scaled_recoil", "finite_elements_scaled_spin"}),
-            ("test_6", {"friction_limit": "total"}, {"published_stick", "published_recoil"})]
 
 
 @pytest.fixture(scope="module")
 def verdicts(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """What a run at eight times the step of the variant is worth beside the published curves, by (variant, engine); each is done once."""
     @cache
-    def get(variant: str, engine: str, **changes: Any) -> dict[str, dict[str, Any]]:
+    def get(variant: str, engine: str) -> dict[str, dict[str, Any]]:
         step = 8.0 * float(find("single_contact").variants[variant]["time_step"])
-        one = decks("single_contact", engine, tmp_path_factory.mktemp(f"{variant}-{engine}"), {"time_step": step, **changes}, variant)
+        one = decks("single_contact", engine, tmp_path_factory.mktemp(f"{variant}-{engine}"), {"time_step": step}, variant)
         one.run()
         found = judged("single_contact", single_contact.measure([one.replica()]))
         return {name: one for name, one in found.items() if name.startswith(("published_", "finite_elements_"))}
@@ -55,12 +49,6 @@ def test_every_published_curve_has_a_verdict(variant: str, engine: str, verdicts
     found = verdicts(variant, engine)
     assert found.keys() == published(variant)
     assert names(found, "fail") == DIFFERENT[variant], found
-
-
-@pytest.mark.parametrize(("variant", "changes", "seen"), CONTROLS)
-def test_wrong_physics_is_seen(variant: str, changes: dict[str, float], seen: set[str], verdicts: Any) -> None:
-    assert not seen & names(verdicts(variant, "liggghts"), "fail")
-    assert seen <= names(verdicts(variant, "liggghts", **changes), "fail")
 
 
 @pytest.mark.parametrize(("shift", "verdict"), [(0.0, "pass"), (0.05, "pass"), (0.2, "fail")])

@@ -1,6 +1,5 @@
 """What is measured of silos finds what was put into synthetic runs, and does not pass what is wrong."""
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,46 +7,33 @@ import numpy as np
 import pytest
 import xarray
 
-from dembark.common.errors import RunError
 from dembark.input_decks.silo.janssen import two_parameter
-from dembark.input_decks.tests.measuring import Control, compare, dried, judged, measure, measured, module, names, pair
+from dembark.input_decks.tests.measuring import Control, compared, dried, judged, measure, measured, module, names, pair, point
 from dembark.input_decks.tests.synthetic import DIAMETER, silo, told
 from dembark.physics import capillary_force
 
 SILO = module("silo")
 
 
-def by_name(content):
-    return {quantity["name"]: quantity for quantity in content["quantities"]}
-
-
 def test_silo_that_follows_janssen_passes(tmp_path):
     folder = silo(tmp_path, k=0.8, friction=0.25, noise=0.1)
-    content = measure(folder)
-    found = by_name(content)
+    found = measured(folder)
     assert found["stress_ratio_k"]["value"] == pytest.approx(0.8, rel=0.02)
     assert found["wall_mobilisation"]["value"] == pytest.approx(0.25, rel=0.01)
     assert found["janssen_length_predicted"]["value"] == pytest.approx(2.5, rel=0.02)
     assert found["janssen_length_measured"]["value"] == pytest.approx(2.5, rel=0.03)
     assert found["stress_ratio_k_contacts"]["value"] == pytest.approx(0.8, rel=0.02)
     assert found["two_parameter_gain"]["value"] < 1.0
-    assert {
-        found[name]["verdict"]
-        for name in (
-            "janssen_profile_deviation",
-            "janssen_length_predicted",
-            "apparent_mass_ratio",
-            "sliding_friction",
-            "force_balance_error",
-            "field_balance_deviation",
-        )
-    } == {"pass"}
+    assert names(found, "pass") >= {"janssen_profile_deviation", "janssen_length_predicted", "apparent_mass_ratio", "sliding_friction",
+                                    "force_balance_error", "field_balance_deviation"}
     assert abs(found["field_balance_deviation"]["value"]) < 1e-9
-    assert json.loads((folder / "metrics.json").read_text()) == content
+    # What is calibrated in the column itself is no evidence.
+    assert {found[name]["evidence"] for name in ("janssen_length_predicted", "janssen_profile_deviation", "field_janssen_deviation")} == {
+        "identity"}
 
 
 def test_wet_silo_follows_janssen_with_the_adhesion_that_hangs_on_the_wall(tmp_path):
-    found = by_name(measure(silo(tmp_path, k=0.8, friction=0.25, noise=0.02, bridge_volume=8e-11)))
+    found = measured(silo(tmp_path, k=0.8, friction=0.25, noise=0.02, bridge_volume=8e-11))
     bridge = float(capillary_force(0.5 * DIAMETER, np.inf, 0.0, 8e-11, 0.072, 0.35))
     # Bands are those of the measured height.
     assert found["wall_adhesion"]["value"] == pytest.approx(24 * bridge / (2 * np.pi * 0.025 * DIAMETER), rel=5e-3)
@@ -55,24 +41,18 @@ def test_wet_silo_follows_janssen_with_the_adhesion_that_hangs_on_the_wall(tmp_p
     assert found["wall_mobilisation"]["value"] == pytest.approx(0.25, rel=0.01)
     assert found["janssen_length_predicted"]["value"] == pytest.approx(2.5, rel=0.02)
     assert found["janssen_length_measured"]["value"] == pytest.approx(2.5, rel=0.03)
-    assert {found[name]["verdict"] for name in ("janssen_profile_deviation", "janssen_length_predicted", "apparent_mass_ratio")} == {"pass"}
+    assert names(found, "pass") >= {"janssen_profile_deviation", "janssen_length_predicted", "apparent_mass_ratio"}
 
 
 def test_solid_fraction_counts_up_to_the_wall(tmp_path):
-    found = by_name(measure(silo(tmp_path)))
+    found = measured(silo(tmp_path))
     assert found["solid_fraction"]["value"] == pytest.approx(24.0 * np.pi / 6.0 * DIAMETER**2 / (np.pi * 0.025**2), rel=2e-3)
-
-
-def test_missing_wall_force_is_a_failed_balance(tmp_path):
-    found = by_name(measure(silo(tmp_path, noise=0.01, lost_wall_force=0.01)))["force_balance_error"]
-    assert found["value"] == pytest.approx(-0.01 * 0.75, rel=0.3)
-    assert found["verdict"] == "fail"
 
 
 def test_three_replicas_give_an_interval_over_replicas(tmp_path):
     for replica, k in ((1, 0.78), (2, 0.8), (3, 0.83)):
         folder = silo(tmp_path, replica=replica, k=k, noise=0.1, seed=replica)
-    found = by_name(measure(folder))["stress_ratio_k"]
+    found = measured(folder)["stress_ratio_k"]
     assert found["basis"] == "3 replicas"
     low, high = found["interval"]
     assert low < 0.8 < high
@@ -85,55 +65,37 @@ def three_packings(folder, engine, **values):
     return measure(made)
 
 
+@pytest.mark.full
 def test_engines_that_agree_and_engines_that_do_not(tmp_path):
     for engine in ("liggghts", "yade"):
         three_packings(tmp_path, engine, k=0.8)
-    found = by_name(compare(tmp_path / "silo" / "dry"))
-    assert found["stress_ratio_k"]["verdict"] == "pass"
+    assert compared(tmp_path / "silo" / "dry")["stress_ratio_k"]["verdict"] == "pass"
     for engine, k in (("liggghts", 0.8), ("yade", 1.0)):
         three_packings(tmp_path, engine, variant="wet", k=k)
-    found = by_name(compare(tmp_path / "silo" / "wet"))
-    assert found["stress_ratio_k"]["verdict"] == "fail"
-    assert found["stress_ratio_k"]["deviation"] == pytest.approx(0.25, rel=0.05)
+    found = compared(tmp_path / "silo" / "wet")["stress_ratio_k"]
+    assert found["verdict"] == "fail" and found["deviation"] == pytest.approx(0.25, rel=0.05)
 
 
 def test_height_of_one_packing_has_no_interval_and_decides_nothing(tmp_path):
-    height = by_name(measure(silo(tmp_path, noise=0.1)))["filling_height"]
-    assert height["interval"] is None
+    height = measured(silo(tmp_path, noise=0.1))["filling_height"]
     found = pair(height, height | {"value": 1.003 * height["value"]})
-    assert found["verdict"] == "info"
-    assert "other packings" in found["reason"]
-
-
-@pytest.mark.parametrize(("wrong", "failed"), [
-    ({"friction": 0.005, "stated": 0.25}, {"sliding_friction"}),
-    ({"inner": 1.2}, {"apparent_mass_ratio"}),
-    ({"inner": 0.8}, {"apparent_mass_ratio"}),
-    ({"heavier": 2.0}, {"apparent_mass_ratio", "force_balance_error"}),
-], ids=["almost_liquid", "k_high", "k_low", "doubled_gravity"])
-def test_silo_with_wrong_physics_fails_what_is_predicted(tmp_path, wrong, failed):
-    found = by_name(measure(silo(tmp_path, noise=0.02, **wrong)))
-    assert failed <= names(found, "fail")
-    # What is calibrated in the column itself passes an almost-liquid too, and so is no evidence.
-    calibrated = [found[name] for name in ("janssen_length_predicted", "janssen_profile_deviation", "field_janssen_deviation")]
-    assert {one["evidence"] for one in calibrated} == {"identity"}
-    if "heavier" not in wrong:
-        assert "fail" not in {one["verdict"] for one in calibrated}
+    assert height["interval"] is None and found["verdict"] == "info" and "other packings" in found["reason"]
 
 
 @pytest.mark.parametrize(("stated", "judged"), [(0.26, True), (0.27, False)], ids=["mobilised", "not mobilised"])
 def test_janssen_with_the_kinetic_friction_is_a_reference_where_it_is_mobilised(tmp_path, stated, judged):
     """A wall of 0.25 has 96 and 93 % of these."""
     content = measure(silo(tmp_path, noise=0.02, stated=stated))
-    share, remarks = by_name(content)["apparent_mass_ratio"], " ".join(content["remarks"])
+    share = next(one for one in content["quantities"] if one["name"] == "apparent_mass_ratio")
+    remarks = " ".join(content["remarks"])
     assert (share["tolerance"] is not None) is judged and ("mobilises less than 95%" in share["reason"]) is not judged
     assert ("is no reference here" in remarks) is not judged
 
 
 def test_only_contacts_that_slide_have_kinetic_friction(tmp_path):
-    half = by_name(measure(silo(tmp_path / "half", sticking=0.5)))
+    half = measured(silo(tmp_path / "half", sticking=0.5))
     assert half["sliding_load"]["value"] == pytest.approx(0.5) and half["sliding_friction"]["verdict"] == "pass"
-    none = by_name(measure(silo(tmp_path / "none", sticking=1.0, stated=1.0)))
+    none = measured(silo(tmp_path / "none", sticking=1.0, stated=1.0))
     assert none["sliding_load"]["value"] == 0.0 and none["apparent_mass_ratio"]["tolerance"] is None
     # A wall along which nothing slides has not been tested: the check is open, not gone.
     assert none["sliding_friction"]["verdict"] == "info" and none["sliding_friction"]["tolerance"] == 0.01
@@ -146,8 +108,7 @@ def points(k_mu=0.235, others=None, heavier=1.0, hydrostatic=0.0, half=0.002, si
         own = k_mu if others is None or variant == "dry" else others
         share = float(two_parameter(np.array([height]), 0.5 / own, hydrostatic)[0]) / height * (1.0 if variant == "dry" else heavier)
         values = {"filled_mass": 4500.0 * height * radius**3, "filling_height": height, "apparent_mass_ratio": share, "k_mu_contacts": k_mu}
-        yield {"variant": variant, "parameters": {"cylinder_radius": radius},
-               "quantities": [{"name": name, "value": value, "interval": [value - half, value + half]} for name, value in values.items()]}
+        yield point({"cylinder_radius": radius}, values, half, variant=variant)
 
 
 def study(**changes):
@@ -178,9 +139,8 @@ def test_a_hydrostatic_zone_is_found():
 
 def test_mobilisation_over_the_friction_of_the_wall():
     def wall(friction, share):
-        found = {"wall_mobilisation": 0.8 * friction * share, "sliding_load": share}
-        return {"parameters": {"wall_friction": friction, "kinetic_friction_ratio": 0.8},
-                "quantities": [{"name": name, "value": value, "interval": [value - 0.01, value + 0.01]} for name, value in found.items()]}
+        return point({"wall_friction": friction, "kinetic_friction_ratio": 0.8},
+                     {"wall_mobilisation": 0.8 * friction * share, "sliding_load": share}, 0.01)
 
     walls = [wall(0.5, 0.57), wall(0.2, 1.0), wall(0.3, 0.93)]
     mobilised, sliding = SILO.study("mobilisation", walls, "wall_friction").profiles
@@ -188,26 +148,10 @@ def test_mobilisation_over_the_friction_of_the_wall():
     assert mobilised["value"] == pytest.approx([1.0, 0.93, 0.57]) and sliding["value"] == [1.0, 0.93, 0.57]
 
 
-def test_compare_needs_two_engines(tmp_path):
-    measure(silo(tmp_path))
-    with pytest.raises(RunError, match="liggghts only"):
-        compare(tmp_path / "silo" / "dry")
-
-
-def test_truncated_dump_is_one_clear_line(tmp_path):
-    folder = silo(tmp_path)
-    path = folder / "replica-1" / "contacts.dump"
-    path.write_bytes(path.read_bytes()[:-100])
-    with pytest.raises(RunError, match="truncated") as caught:
-        measure(folder)
-    assert "\n" not in str(caught.value)
-    assert not (folder / "metrics.json").exists()
-
-
 @pytest.fixture(scope="module")
 def measured_silo(tmp_path_factory):
     folder = silo(tmp_path_factory.mktemp("silo"), k=0.8, friction=0.25, noise=0.02)
-    return {one["name"]: one for one in measure(folder)["quantities"]}, xarray.load_dataset(folder / "fields.nc", engine="h5netcdf")
+    return measured(folder), xarray.load_dataset(folder / "fields.nc", engine="h5netcdf")
 
 
 def test_silo_has_its_fields_beside_its_metrics(measured_silo):

@@ -76,16 +76,6 @@ def test_round_off_does_not_decide_at_which_impact_engines_are_compared(variant)
     assert all(one == pytest.approx(found[0], rel=1e-9, abs=1e-12) for one in found)
 
 
-@pytest.mark.parametrize("points", [1, 3])
-def test_a_wrong_force_at_its_overlap_is_seen(points):
-    p = parameters("test_1", points=points)
-    p |= {"time_step": 8.0 * p["time_step"]}
-    flight = flown(p)
-    # That of the first sphere of material B.
-    wrong = replace(flight, forces=flight.forces * np.where(np.arange(2 * points) == points, 1.001, 1.0))
-    assert names(verdicts(p, wrong), "fail") == {"force_law_error_b"}
-
-
 @pytest.mark.parametrize("variant", find("single_contact").variants)
 def test_the_set_up_of_the_decks_is_what_they_are_compared_with(variant):
     """Start and materials of the bodies follow from the parameters twice: for the decks, and for the reference."""

@@ -79,16 +79,6 @@ def test_large_grains_that_rise_segregate() -> None:
     assert "segregation_change" not in found
 
 
-def test_a_vessel_that_never_throws_changes_nothing() -> None:
-    assert names(verdicts(swaps=0, mixture="two_sizes", motion_gamma=0.8), "pass") == {"energy_balance", "segregation_change"}
-    assert "segregation_change" in names(verdicts(swaps=0, mixture="two_sizes", motion_gamma=0.8, rising=0.02), "fail")
-
-
-def test_walls_without_friction_drive_no_drift() -> None:
-    assert "wall_drift_smooth" in names(verdicts(swaps=0, wall_friction=0.0), "pass")
-    assert "wall_drift_smooth" in names(verdicts(swaps=0, wall_friction=0.0, drift=-0.1), "fail")
-
-
 @pytest.mark.parametrize(("variant", "large"), [("halves", 0), ("sizes", 40), ("intruder", 1)])
 def test_the_large_grains_of_a_set_up(variant: str, large: int) -> None:
     case = find("vibro_mixing")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.postproc.tests.scenes import frame_of
 from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import find
@@ -82,8 +82,7 @@ def study(name: str, ratio: float) -> dict[str, dict[str, Any]]:
     """Three spacings, the error at the finest `ratio` times that at the coarsest."""
     quantity, due = {"still": ("pressure_rms", 0.0), "floating": ("displaced_volume", 0.8), "cylinder": ("added_mass", 1.0),
                      "slot": ("slot_error", 0.0)}[name.removesuffix("_wide")]
-    points = [{"parameters": {"across": across, "body_density": 800.0, "fluid_density": 1000.0},
-               "quantities": [{"name": quantity, "value": due - error, "interval": None}]}
+    points = [point({"across": across, "body_density": 800.0, "fluid_density": 1000.0}, {quantity: due - error}, None)
               for across, error in ((4, 0.01), (8, 0.02), (16, 0.01 * ratio))]
     return judged("water_tank", tank.study(name, points, "across"))
 
