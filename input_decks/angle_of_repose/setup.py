@@ -1,4 +1,4 @@
-"""Angle of repose: a dilute bed on a plate between two walls, which make way at the outlets beside the plate, and a pit below."""
+"""Angle of repose: a dilute bed on a plate between two walls, which make way at the outlets at its sides, and a pit below."""
 
 import math
 
@@ -19,8 +19,8 @@ def setup(p: Parameters) -> Setup:
     # All grains fit into the pit, in heaps that rise by 0.4 towards the walls.
     pit = math.sqrt(0.4 * p.grain_count * math.pi / 6.0 * d**3 / 0.58 / p.thickness) + 4.0 * d
     top, room = height + 2.0 * d_max, p.outlet_width + 2.0 * d_max
-    beside = d_max if walled else 0.0
-    box = [(-room, p.plate_width + room), (-beside, p.thickness + beside), (-pit - 2.0 * d_max, top)]
+    across = d_max if walled else 0.0
+    box = [(-room, p.plate_width + room), (-across, p.thickness + across), (-pit - 2.0 * d_max, top)]
     grains = packing.grains(p, sites + np.array([0.0, margin, 0.0]), box)
     numbers = {**output, "opened": output["first"] + math.ceil(p.outlet_width / (p.gate_speed * step)),
                "walled": int(walled), "thickness": p.thickness, "pit": -pit, "middle": 0.5 * p.plate_width}

@@ -124,7 +124,7 @@ def measure(replicas: Replicas) -> Measurement:
     def worst(number: Callable[[Collapse], float]) -> Value:
         return Value(exact(np.max([number(one) for one in runs])), exact(0.0))  # of numbers that are none: none
 
-    def beside(number: Callable[[Collapse], float], law: float | None) -> Value:
+    def with_law(number: Callable[[Collapse], float], law: float | None) -> Value:
         other = "the experiments used sand, sugar and rice between side walls, not rolling spheres"
         return Value(over(number), None if law is None else exact(law), reason="" if law is None else other)
 
@@ -137,9 +137,9 @@ def measure(replicas: Replicas) -> Measurement:
         "height_error": Value(over(lambda one: one.potential_error("weight_height"))),
         **{f"{name}_share": share(name) for name in ways},
         "aspect_ratio": Value(aspect),
-        "run_out": beside(lambda one: one.front() / one.width - 1.0, run_out_law(aspect.value)),
-        "final_height": beside(lambda one: float(surface(one.last, np.array([0.0, 2.0 * one.diameter]))[0]) / one.width,
-                               height_law(aspect.value)),
+        "run_out": with_law(lambda one: one.front() / one.width - 1.0, run_out_law(aspect.value)),
+        "final_height": with_law(lambda one: float(surface(one.last, np.array([0.0, 2.0 * one.diameter]))[0]) / one.width,
+                                 height_law(aspect.value)),
         "mean_run_out": Value(over(lambda one: 2.0 * one.centre()[0] / one.width - 1.0)),
         "mean_height": Value(over(lambda one: 2.0 * one.centre()[2] / one.width)),
     }

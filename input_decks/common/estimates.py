@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dembark.postproc.measurement import Array, Estimate, over_replicas
+from dembark.postproc.statistics import combined
 
 
 def over_chaotic(values: Iterable[float]) -> Estimate:
@@ -20,6 +21,12 @@ def over_chaotic(values: Iterable[float]) -> Estimate:
 def divided(found: Estimate, scale: float) -> Estimate:
     """`found` and its interval over `scale`."""
     return Estimate(found.value / scale, found.half / scale, found.basis)
+
+
+def ratio(one: Estimate, other: Estimate) -> Estimate:
+    """`one` over `other`, which are independent."""
+    value = one.value / other.value
+    return Estimate(value, combined([one.half / other.value, value * other.half / other.value]), "propagated from both runs")
 
 
 def values_and_halves(found: Sequence[Estimate]) -> tuple[Array, Array]:

@@ -118,7 +118,7 @@ def solver_values(run: LogRun) -> dict[str, Value]:
 
 def over_time(name: str, title: str, across: str, times: Array, values: Array, reference: Array | None = None, *, label: str = "exact",
               note: str = "", seconds: bool = False) -> dict[str, Any]:
-    """A curve over time in ms, or in `seconds`, of some hundred of the frames, beside a `reference` with its `label`."""
+    """A curve over time in ms, or in `seconds`, of some hundred of the frames, with a `reference` and its `label`."""
     few = slice(None, None, max(1, len(times) // POINTS))
     place, along = (times, "time (s)") if seconds else (1e3 * times, "time (ms)")
     return profile(name, title, along, across, place[few], [values[few]], reference=None if reference is None else reference[few],
@@ -126,7 +126,7 @@ def over_time(name: str, title: str, across: str, times: Array, values: Array, r
 
 
 def energy_curves(run: LogRun, due: Array) -> list[dict[str, Any]]:
-    """Elastic energy beside that of the exact motion, `due` (frames,) in J, and what was lost; over the energy at the beginning."""
+    """Elastic energy and that of the exact motion, `due` (frames,) in J, and what was lost; over the energy at the beginning."""
     start = run.kinetic[0]
     elastic, lost = (np.concatenate([[0.0], run.history[name]]) / start for name in ("elastic_energy", "dissipated_energy"))
     return [

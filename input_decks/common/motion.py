@@ -12,7 +12,7 @@ from dembark.common.errors import DembarkError
 from dembark.physics import WallMotion
 
 Word = str | int | float
-# Rows of time (s) and displacement (m), which each deck of a case has beside it.
+# Rows of time (s) and displacement (m), in the folder of each deck of a case.
 TABLE = "motion.csv"
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # Right-handed: the two axes of the plane across each.

@@ -1,4 +1,4 @@
-"""How a measured quantity grows along the parameter of a study: the exponent of a power law, and its curve beside one."""
+"""How a measured quantity grows along the parameter of a study: the exponent of a power law, and its curve."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ class PowerLawFit:
         return np.asarray(np.exp(np.mean(np.log(self.values) - power * np.log(self.place))) * self.place**power)
 
     def curve(self, name: str, title: str, along: str, across: str, power: float | None = None, label: str = "") -> dict[str, Any]:
-        """The values with their intervals, beside the law with `power`."""
+        """The values with their intervals, and the law with `power`."""
         return profile(name, title, along, across, self.place, [self.values], half=self.halves, reference_label=label,
                        reference=None if power is None else self.law(power))
 
     def convergence(self, name: str, title: str, along: str, order: float) -> dict[str, Any]:
-        """The values, errors of a scheme, on logarithmic axes beside a line of the slope `order`."""
+        """The values, errors of a scheme, on logarithmic axes with a line of the slope `order`."""
         return profile(name, title, f"log₁₀ {along}", "log₁₀ error", np.log10(self.place), [np.log10(self.values)],
                        reference=np.log10(self.law(order)), reference_label=f"slope {order:g}")

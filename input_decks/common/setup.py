@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Setup:
-    """What a deck needs beside the parameters of its case. `steps` of `time_step` (s); `packing`: the bodies at the start; `numbers`:
+    """What a deck needs besides the parameters of its case. `steps` of `time_step` (s); `packing`: the bodies at the start; `numbers`:
     derived values by name, which the decks of all engines use; `meshes`: triangles (n, 3, 3) in m by name, each written as <name>.stl;
     `tables`: rows of numbers by name, for decks alone."""
 

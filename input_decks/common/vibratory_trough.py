@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dembark.postproc.measurement import Array, Curve, Estimate, Replica, block_mean, profile
+from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replica, Value, block_mean, exact, profile
 from dembark.postproc.replica import once
 from dembark.postproc.statistics import combined, jackknife
+from dembark.postproc.studies import measured
 
 from .drive_phases import Phases, binned, read_phases
 from .vibration import PHASES
@@ -31,7 +32,7 @@ def about(places: Array, ways: Array) -> Array:
 
 def circulation(places: Array, ways: Array, masses: Array) -> Array:
     """Angle (...,) in rad by which grains at `places` (..., n, 3) with `masses` (n,) turn about their centre of mass when they move by
-    `ways`: sum m (r x u) / sum m r^2, where r is measured from the centre to the middle of each way, and u beside the centre's."""
+    `ways`: sum m (r x u) / sum m r^2, where r is measured from the centre to the middle of each way, and u relative to the centre's."""
     weights = masses / masses.sum()
     middle = places + 0.5 * ways
 
@@ -181,11 +182,17 @@ def read(replica: Replica) -> Trough:
                   float(derived["drive_speed"]), float(given["grain_diameter"]))
 
 
-def spread(found: Sequence[Estimate]) -> Estimate:
-    """Largest less smallest value over the size of the mean, with the half-width that the intervals of both ends give it."""
-    low, high = (pick(found, key=lambda one: one.value) for pick in (min, max))
-    size = abs(float(np.mean([one.value for one in found])))
-    return Estimate((high.value - low.value) / size, combined([low.half, high.half]) / size, "propagated from the points")
+def numerical_changes(points: Points, quantities: Sequence[str]) -> Measurement:
+    """How far steady `quantities` depend on the numerics: the largest less the smallest value over the size of the mean, with the
+    half-width that the intervals of both ends give it."""
+    values = {}
+    for quantity in quantities:
+        found = [measured(point, quantity) for point in points]
+        low, high = (pick(found, key=lambda one: one.value) for pick in (min, max))
+        size = abs(float(np.mean([one.value for one in found])))
+        change = Estimate((high.value - low.value) / size, combined([low.half, high.half]) / size, "propagated from the points")
+        values[f"{quantity}_change"] = Value(change, exact(0.0))
+    return Measurement(values)
 
 
 def drifts(runs: Sequence[Trough]) -> Curve:

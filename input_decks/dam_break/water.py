@@ -1,4 +1,4 @@
-"""A fluid of particles in the plane, beside what water does."""
+"""A fluid of particles in the plane, compared with water."""
 
 from __future__ import annotations
 

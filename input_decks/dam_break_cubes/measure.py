@@ -1,4 +1,4 @@
-"""Trajectories of the cubes beside the experiment, gaps and floor, and what must not happen."""
+"""Trajectories of the cubes and of the experiment, gaps and floor, and what must not happen."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -145,7 +145,7 @@ def half_fallen(cubes: str, edge: float) -> float:
 
 
 def curves(replicas: Replicas) -> list[Any]:
-    """The top cube's way in all replicas, beside the experiment."""
+    """The top cube's way in all replicas and in the experiment."""
     cubes, top, found = replicas[0].parameters["arrangement"], int(replicas[0].derived["cube_count"]), []
     for axis, title in (("x", "Top cube along the flume"), ("z", "Height of the top cube")):
         times, places = published(cubes, axis)

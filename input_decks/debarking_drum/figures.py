@@ -43,19 +43,16 @@ def _map(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
             axes.set_title(looks[engine].title, loc="center")
             axes.axis("off")
         bar(figure, list(panels), scale, SEQUENTIAL, "log₁₀ of the power dissipated in impacts (W/m²)", shrink=0.8, aspect=22, pad=0.02)
+    loads = f" of {first['replicas']} loads" if first["replicas"] > 1 else ""
     caption = (
         f"Energy dissipated in impacts (approach of {first['impact_speed']:g} m/s or more) per time and area of the cross-section, over "
-        f"{first['revolutions']} revolutions{_loads(first)}, from the records of {first['impacts']} impacts; each counts "
+        f"{first['revolutions']} revolutions{loads}, from the records of {first['impacts']} impacts; each counts "
         f"at the position where it began. White: no impacts. Circles: logs of the last frame. The drum turns clockwise; logs are "
         f"{first['log_length']:g} m long."
     )
     table = grid_table(["x_m", "z_m", "power_W_per_m2"], {
         engine: (one.x.values, one.z.values, [one.impact_power.values]) for engine, one in datasets.items()})
     return FieldFigure("map", figure, "Impact power over the cross-section", caption, {"power": table})
-
-
-def _loads(attributes: Mapping[str, Any]) -> str:
-    return f" of {attributes['replicas']} loads" if attributes["replicas"] > 1 else ""
 
 
 def _shell(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:

@@ -1,4 +1,4 @@
-"""Drive power: what a shaken bed takes from the plate, beside a block that sticks where it lands, and how it rises when shaken hard."""
+"""Drive power: what a shaken bed and a block that sticks where it lands take from the plate, and how a bed rises when shaken hard."""
 
 import math
 from collections.abc import Callable
@@ -61,7 +61,7 @@ def measure(replicas: Replicas) -> Measurement:
 
 
 def stiffness(points: Points, moduli: Array) -> list[Curve]:
-    """Power and time in flight over Young's modulus (Pa), beside those of a block that sticks."""
+    """Power and time in flight over Young's modulus (Pa), and those of a block that sticks."""
     block = sticking_block(acceleration(points[0]["parameters"]))
 
     def curve(quantity: str, title: str, axis: str) -> Curve:

@@ -49,7 +49,7 @@ def estimates(one: Channel) -> dict[str, Estimate]:
 
 
 def profiles(channels: Sequence[Channel]) -> list[Curve]:
-    """Across the channel: velocity, also scaled beside one exponential, fluctuation, solid fraction and inertial number."""
+    """Across the channel: velocity, also scaled with one exponential, fluctuation, solid fraction and inertial number."""
     scaled = [one.scaled_deficit(thickness(one, one.frames)) for one in channels]
     # The cells' own places only: between them a straight line is far from an exponential.
     reach = np.mean([where for where, _ in scaled], axis=0)

@@ -11,7 +11,7 @@ def setup(p: Parameters) -> Setup:
     step, fall_time = time_step(p), math.sqrt(p.channel_width / p.gravity)
     pack_steps = math.ceil(p.pack_time * math.sqrt(p.grain_diameter / p.gravity) / step)
     run_in_steps = math.ceil(p.run_in * fall_time / step)
-    # The walls' friction is only steady in the mean, hence many rows.
+    # The walls' friction is only steady in the mean: many rows.
     steps = window(pack_steps + run_in_steps, math.ceil(p.measure * fall_time / (step * p.frames)), p.frames, rows=10000)
     d_max = packing.largest(p)
     sites, height = packing.slab(p, p.channel_width, p.channel_depth, margin=0.15 * d_max, foot=0.0)

@@ -1,4 +1,4 @@
-"""Logs beside their exact motion: one impact of two logs, or of a log and a wall, and a row of logs."""
+"""Logs and their exact motion: one impact of two logs, or of a log and a wall, and a row of logs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def velocities(run: LogRun, bodies: Pair, motion: PairMotion, error: float) -> d
 
 
 def pair_curves(run: LogRun, bodies: Pair, motion: PairMotion) -> list[Curve]:
-    """Force, velocities along the line of centres and energies over time, beside the exact motion."""
+    """Force, velocities along the line of centres and energies over time, with the exact motion."""
     along, due = run.velocities[:, :, :2] @ motion.normal, motion.velocities @ motion.normal
     force = np.linalg.norm(run.forces[:, 0], axis=1)
     return [
@@ -49,7 +49,7 @@ def pair_curves(run: LogRun, bodies: Pair, motion: PairMotion) -> list[Curve]:
 
 
 def row_curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[Curve]:
-    """Velocities of some logs, forces at both ends of the row and energies over time, beside the exact motion."""
+    """Velocities of some logs, forces at both ends of the row and energies over time, with the exact motion."""
     n, along, forces, due = len(run.masses), run.velocities[:, :, 0], run.neighbour_forces() / 1e3, motion.forces / 1e3
     return [
         *(over_time(f"velocity_{log + 1}", f"Velocity of log {log + 1}", "v (m/s)", run.times, along[:, log], motion.velocities[:, log])

@@ -40,7 +40,7 @@ def measure(replicas: Replicas) -> Measurement:
         "peak_force": number(run.history["highest_force"][-1], motion.peak, bound=0.5 * loss + 0.75 * square, scale=motion.peak,
                              detail="damped" if damped else f"the deviation of the scheme is −π/4 (2θ−1) ωτ = {-50.0 * loss:.2g} %"),
         "contact_time": number(run.impacts[0, 3] if len(run.impacts) else math.nan, duration, bound=run.time_step + 1e-12 * duration,
-                               scale=duration, detail=f"counted in whole steps, hence uncertain by one step; ωτ = {turn:.3g}"),
+                               scale=duration, detail=f"counted in steps, uncertain by one; ωτ = {turn:.3g}"),
         **velocities(run, bodies, motion, loss + 0.25 * square),
         "restitution": number(e, e_exact * math.exp(-loss), bound=0.25 * square + turned, detail=f"exact two-body solution: {e_exact:.6f}"),
         "velocity_curve_error": number(np.abs(run.velocities[:, 0, :2] - motion.velocities[:, 0]).max() / bodies.speed),

@@ -33,12 +33,6 @@ def _ratio(above: Array, below: Array) -> Array:
     return np.divide(above, below, out=np.full(len(above), np.nan), where=below > 0.0)
 
 
-def fitted_decay(place: Array, deficit: Array, start: float) -> float:
-    """Length of the exponential that fits `deficit` at the distances `place` best, in their unit; `start`: a guess."""
-    fit = least_squares(lambda p: p[0] * np.exp(-place / np.exp(p[1])) - deficit, [max(deficit[0], 1e-3), np.log(start)])
-    return float(np.exp(min(fit.x[1], 300.0)))
-
-
 @dataclass(frozen=True)
 class Channel:
     """One replica, steady part: arrays over frames, cells across (x) and bands of height (z), in SI units. `speed` (m/s): the scale of
@@ -126,7 +120,10 @@ class Channel:
 
     def decay_length(self, frames: Mask, bands: Bands = ALL, cells: int = 1, start: float = 2.0) -> float:
         """Length in d of the exponential that fits the deficit; `start` in d."""
-        return min(fitted_decay(*self.deficit(frames, bands, cells), start * self.diameter), self.width) / self.diameter
+        place, deficit = self.deficit(frames, bands, cells)
+        begin = [max(deficit[0], 1e-3), np.log(start * self.diameter)]
+        fit = least_squares(lambda p: p[0] * np.exp(-place / np.exp(p[1])) - deficit, begin)
+        return min(float(np.exp(min(fit.x[1], 300.0))), self.width) / self.diameter
 
     def scaled_deficit(self, length: float) -> tuple[Array, Array]:
         """Distance from the layer at the nearer wall over `length` (d), and (v_core - v) / (v_core - v_wall) there; 1 at 0. The layer's

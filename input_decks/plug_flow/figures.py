@@ -1,4 +1,4 @@
-"""Fields of a channel: maps over width and height for each engine, and profiles across it, Eulerian beside Lagrangian."""
+"""Fields of a channel: maps over width and height for each engine, and profiles across it, Eulerian and Lagrangian."""
 
 from __future__ import annotations
 

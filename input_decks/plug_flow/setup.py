@@ -23,7 +23,7 @@ def setup(p: Parameters) -> Setup:
     bodies = packing.grains(p, sites, box)
     if rough:
         bodies = bodies.joined(glued(p, low, height), p.grain_diameter, p.grain_density, 2)
-    # The plate stops short of glued grains, which a mesh wall would push against whatever its group; the gap lets no grain through.
+    # The plate stops short of glued grains, which a mesh wall pushes in any group; the gap lets no grain through.
     ends = (0.62 * p.grain_diameter, p.channel_width - 0.62 * p.grain_diameter) if rough else box[0]
     plate = rectangle((ends[0], 0.0, 0.0), (ends[1] - ends[0], 0.0, 0.0), (0.0, p.channel_depth, 0.0))
     return Setup(steps["steps"], step, bodies, {**steps, **contacts(p, skin=0.3), "settle_steps": settle_steps}, {"plate": plate})

@@ -101,14 +101,14 @@ def measure(replicas: Replicas) -> Measurement:
     return Measurement(values, [speeds(drums, tracked_drum), densities(drums)])
 
 
-def speeds(drums: list[DrumFlow], beside: bool) -> Curve:
+def speeds(drums: list[DrumFlow], with_data: bool) -> Curve:
     """The speed along the surface over n, with the tracked points."""
     every = np.ones(len(drums[0].solid), bool)
     known = ~np.isnan([drum.velocity(every) for drum in drums]).any(axis=0)
     place = drums[0].middle[known]
     values = [drum.velocity(every)[known] for drum in drums]
     title, along, across = "Speed along the free surface", "distance from the axis along the normal (m)", "u (m/s), positive with the drum"
-    if not beside:
+    if not with_data:
         return profile("velocity", title, along, across, place, values)
     n, u = tracked()
     inside = (n > place[0]) & (n < place[-1])

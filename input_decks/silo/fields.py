@@ -1,4 +1,4 @@
-"""Fields of a cylindrical silo over radius and height: stresses beside Janssen's law, K from the axis to the wall, balance of momentum."""
+"""Fields of a cylindrical silo over radius and height: stresses and Janssen's law, K from the axis to the wall, balance of momentum."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fields of a silo: maps over radius and height as a cut through the cylinder, and profiles beside Janssen's law."""
+"""Fields of a silo: maps over radius and height as a cut through the cylinder, and profiles with Janssen's law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is measured of any silo: quantities with intervals from its columns, the curves beside Janssen's law, and the remarks."""
+"""What is measured of any silo: quantities with intervals from its columns, the curves with Janssen's law, and the remarks."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ class Solutions:
             self.law = (self.slip, partial_slip(one, 200, 1000))
 
     def bound(self, name: str, due: Array) -> Array:
-        """What is allowed beside `due` (n,): twice what the scheme loses at this step, the worst of four phases of the touch within it. Of
+        """Allowed difference from `due` (n,): twice what the scheme loses at this step, the worst of four phases of the touch within it. Of
         contacts that slip in parts: a hundredth of the sliding friction throughout, within which their eight rings lie."""
         if self.in_parts and name in ("slide", "spin"):
             return 0.01 * {"slide": 1.0, "spin": 2.5}[name] * self._sliding

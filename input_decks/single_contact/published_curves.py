@@ -1,4 +1,4 @@
-"""Curves of a run beside those that somebody published, read from figures."""
+"""Curves of a run compared with published ones, read from figures."""
 
 from __future__ import annotations
 

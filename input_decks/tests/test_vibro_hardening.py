@@ -63,7 +63,7 @@ def measured(folder: Path, booked: float = 1.0, lost: int = 0) -> dict[str, Any]
     # As heavy as the impacts on the part are strong.
     light = replace(run, rows=rows, weight=whole / (PERIODS * PERIOD))
     replica = Replica(Path(), {"parameters": defaults("vibro_hardening")})
-    replica.__dict__["_read"] = {vibratory_trough.read.__wrapped__: light, hardening.touches.__wrapped__: hits}
+    replica.__dict__["_read"] = {vibratory_trough.read.__wrapped__: light, hardening.contact_record.__wrapped__: hits}
     return judged("vibro_hardening", hardening.measure([replica]))
 
 

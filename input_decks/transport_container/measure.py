@@ -74,7 +74,7 @@ def read(replica: Replica) -> dict[str, float]:
     frames = [frame.select(frame.types == 1) for frame in replica.grains()]
     mass, g, d = float(frames[0].masses.sum()), float(p["gravity"]), float(p["grain_diameter"])
     times = rows["time"]
-    # Each wall's own sum over all steps, which the engine made, beside the momentum of the grains.
+    # Each wall's own sum over all steps, which the engine made, and the momentum of the grains.
     all_walls = [np.diff(rows[f"{name}_jx"])[first:] for name in WALLS]
     gained = float(rows["momentum_x"][-1] - rows["momentum_x"][first])
     size = float(sum(np.abs(one).sum() for one in all_walls))
@@ -147,7 +147,7 @@ def _history(replicas: Replicas, wall: str) -> Curve:
 
 
 def _pressure(replicas: Replicas, wall: str) -> Curve:
-    """Mean pressure on a side wall over height, without the grains on the base, while the container moves, beside that at rest."""
+    """Mean pressure on a side wall over height, without the grains on the base, while the container moves and at rest."""
     d = float(replicas[0].parameters["grain_diameter"])
     edges = d * np.arange(0.0, replicas[0].parameters["bed_height"] + 1.0)
 
@@ -170,7 +170,7 @@ def _pressure(replicas: Replicas, wall: str) -> Curve:
 
 
 def study(name: str, results: Points, along: str) -> Measurement:
-    """D of the longest pulse beside one, if it is slow; or the onset on a ramp beside that of tilting."""
+    """D of the longest pulse against one, if it is slow; or the onset on a ramp against that of tilting."""
     results, place = ordered(results, along)
     quantity = "amplification" if name == "pulse" else "slide_slope"
     found = [measured(one, quantity) for one in results]

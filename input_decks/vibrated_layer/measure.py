@@ -120,18 +120,18 @@ def of_sweep(runs: list[Layer], p: Numbers) -> dict[str, Value]:
 
 
 def spectra(runs: list[Layer]) -> list[Curve]:
-    """Power over the wave number at f/2 beside that of noise, and at f."""
+    """Power over the wave number at f/2, of noise, and at f."""
     first = runs[0].waves[0]
     place = runs[0].diameter / first.lengths()
     along, across = "d/λ", "power (d²)"
     noise = np.mean([one.waves[0].noise() for one in runs], axis=0)
     return [profile("power_half", "Power of the surface at f/2", along, across, place, [one.waves[0].line(0.5) for one in runs],
-                    reference=noise, reference_label="noise beside f/2"),
+                    reference=noise, reference_label="noise next to f/2"),
             profile("power_full", "Power of the surface at f", along, across, place, [one.waves[0].line(1.0) for one in runs])]
 
 
 def crests(run: Layer) -> list[Curve]:
-    """The surface at the phase at which it differs most from that a period later, at the end of the window, beside that."""
+    """The surface at the phase at which it differs most from that a period later, at the end of the window, and that one."""
     waves, d = run.waves[0], run.diameter
     now, later = waves.heights[-2 * PHASES : -PHASES], waves.heights[-PHASES:]
     phase = int(np.nanargmax(np.nanstd(now - later, axis=1)))
@@ -200,6 +200,6 @@ def shifts(points: Points) -> Measurement:
         values[f"onset_shift_{label}"] = Value(value)
         if abs(value.value) > OF_FIVE * value.half:
             seen.append(label.replace("_", " "))
-    told = f"seen: {', '.join(seen)}" if seen else "none is seen"
-    values["shifts_seen"] = Value(exact(len(seen)), verdict="pass" if seen else "fail", detail=f"{told}; passes with one")
+    listed = f"seen: {', '.join(seen)}" if seen else "none is seen"
+    values["shifts_seen"] = Value(exact(len(seen)), verdict="pass" if seen else "fail", detail=f"{listed}; passes with one")
     return Measurement(values)

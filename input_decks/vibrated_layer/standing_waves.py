@@ -93,9 +93,9 @@ class Waves:
         return np.asarray(self.power[keep][:, 1:, round(part * WINDOW)].mean(axis=0))
 
     def noise(self, keep: Mask | slice = slice(None)) -> Array:
-        """Power (modes,) of the modes from 1 on in a line beside f/2."""
-        beside = [WINDOW // 2 - BESIDE, WINDOW // 2 + BESIDE]
-        return np.asarray(self.power[keep][:, 1:, beside].mean(axis=(0, 2)))
+        """Power (modes,) of the modes from 1 on in the lines next to f/2."""
+        lines = [WINDOW // 2 - BESIDE, WINDOW // 2 + BESIDE]
+        return np.asarray(self.power[keep][:, 1:, lines].mean(axis=(0, 2)))
 
     def subharmonic(self, keep: Mask | slice = slice(None)) -> float:
         """Power at f/2 of all modes from 1 on, less that of noise."""

@@ -5,16 +5,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dembark.input_decks.common.estimates import divided, over_chaotic
+from dembark.input_decks.common.estimates import divided, over_chaotic, ratio
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
 from dembark.input_decks.common.power_law import ordered
-from dembark.input_decks.common.vibratory_trough import Trough, drifts, read, spectra, spread
+from dembark.input_decks.common.vibratory_trough import Trough, drifts, numerical_changes, read, spectra
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, over_replicas
-from dembark.postproc.statistics import combined
 from dembark.postproc.studies import measured
-
-# What must not depend on the numerics.
-STEADY = ("circulation", "spin", "revolution")
 
 
 def measure(replicas: Replicas) -> Measurement:
@@ -42,16 +38,9 @@ def measure(replicas: Replicas) -> Measurement:
 
 
 def study(name: str, points: Points, along: str) -> Measurement:
-    """The circulation beside that of the reversed drive and of one up and down; or how far the steady motion depends on the numerics."""
+    """The circulation over that of the reversed drive, and of one up and down; or how far the steady motion depends on the numerics."""
     points, _ = ordered(points, along)
     if name == "sense":
         back, none, fore = (measured(point, "circulation") for point in points)
-        return Measurement({"reversal": Value(over(back, fore), exact(-1.0)), "vertical": Value(over(none, fore), exact(0.0))})
-    return Measurement({f"{quantity}_change": Value(spread([measured(point, quantity) for point in points]), exact(0.0))
-                        for quantity in STEADY})
-
-
-def over(one: Estimate, other: Estimate) -> Estimate:
-    """The ratio of two independent estimates."""
-    ratio = one.value / other.value
-    return Estimate(ratio, combined([one.half / other.value, ratio * other.half / other.value]), "propagated from both runs")
+        return Measurement({"reversal": Value(ratio(back, fore), exact(-1.0)), "vertical": Value(ratio(none, fore), exact(0.0))})
+    return numerical_changes(points, ("circulation", "spin", "revolution"))

@@ -7,25 +7,22 @@ from types import SimpleNamespace
 import numpy as np
 
 from dembark.input_decks.common import vibratory_trough
-from dembark.input_decks.common.estimates import divided, over_chaotic
+from dembark.input_decks.common.estimates import divided, over_chaotic, ratio
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
 from dembark.input_decks.common.motion import motion
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.common.trough import polygon
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas
 from dembark.postproc.replica import once
-from dembark.postproc.statistics import combined
 from dembark.postproc.studies import measured
 
 from .part_impacts import ContactRecord, histogram, read_record
 
 WALLS = ("trough", "part")
-# What must not depend on the numerics.
-STEADY = ("circulation", "impact_energy")
 
 
 @once
-def touches(replica: Replica) -> ContactRecord:
+def contact_record(replica: Replica) -> ContactRecord:
     """The record of the grains on the part."""
     p, derived = replica.parameters, replica.derived
     period = int(derived["period_steps"])
@@ -37,7 +34,7 @@ def touches(replica: Replica) -> ContactRecord:
 
 def measure(replicas: Replicas) -> Measurement:
     """Values and curves of all replicas of a series."""
-    runs, records, p = [vibratory_trough.read(one) for one in replicas], [touches(one) for one in replicas], replicas[0].parameters
+    runs, records, p = [vibratory_trough.read(one) for one in replicas], [contact_record(one) for one in replicas], replicas[0].parameters
     drive = 2.0 * math.pi * p["motion_frequency"]
     mass = p["grain_density"] * math.pi / 6.0 * p["grain_diameter"] ** 3
     unit = 0.5 * mass * runs[0].speed**2
@@ -70,11 +67,9 @@ def study(name: str, points: Points, along: str) -> Measurement:
     points, place = ordered(points, along)
     if name == "amplitude":
         found = [measured(point, "stirring") for point in points]
-        ratio = found[-1].value / found[0].value
-        gain = Estimate(ratio, ratio * combined([one.half / one.value for one in (found[0], found[-1])]), "propagated from both runs")
+        gain = ratio(found[-1], found[0])
         verdict = "pass" if gain.interval[0] > 1.0 else "fail" if gain.interval[1] <= 1.0 else "info"
         curve = PowerLawFit.of(points, "stirring", place).curve("stirring", "Fluctuation over mean speed", "amplitude (m)", "")
-        told = "passes when the whole interval is above 1"
-        return Measurement({"stirring_gain": Value(gain, exact(1.0), verdict=verdict, detail=told)}, [curve])
-    return Measurement({f"{quantity}_change": Value(vibratory_trough.spread([measured(point, quantity) for point in points]), exact(0.0))
-                        for quantity in STEADY})
+        return Measurement({"stirring_gain": Value(gain, exact(1.0), verdict=verdict, detail="passes when all of the interval is above 1")},
+                           [curve])
+    return vibratory_trough.numerical_changes(points, ("circulation", "impact_energy"))

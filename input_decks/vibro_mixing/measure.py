@@ -55,11 +55,11 @@ def equal(tracks: list[Array], diameter: float) -> tuple[dict[str, Value], list[
                  for track in tracks for frame in track]
     labels = [lacey_index(shuffled(random, lower_half(frame[:, 0])), sampled(frame, diameter))
               for track in tracks for frame in track for _ in range(20)]
-    told = [segregation(kinds, frame[:, 1]) for track in tracks
+    labelled = [segregation(kinds, frame[:, 1]) for track in tracks
             for kinds in (shuffled(random, lower_half(track[0, :, 1])) for _ in range(LABELLINGS)) for frame in track]
     values = {"index_separated": Value(exact(float(np.mean(separated))), exact(0.0)),
               "index_random": Value(exact(float(np.mean(labels))), exact(1.0)),
-              "segregation_labels": Value(exact(float(np.mean(told))), exact(0.0))}
+              "segregation_labels": Value(exact(float(np.mean(labelled))), exact(0.0))}
     for name, found in indices.items():
         values[f"index_{name}"] = Value(over_chaotic(float(one[-1]) for one in found))
         values[f"mixing_rate_{name}"] = Value(over_replicas([mixing_rate(one) for one in found]))
@@ -84,8 +84,11 @@ def unequal(tracks: list[Array], large: list[Kinds], p: Numbers) -> tuple[dict[s
         heights = [(track[:, kinds, 1].mean(axis=1) - track[:, :, 1].min(axis=1)) / p["grain_diameter"]
                    for track, kinds in zip(tracks, large, strict=True)]
         tops = [(track[:, :, 1].max(axis=1) - track[:, :, 1].min(axis=1)) / p["grain_diameter"] for track in tracks]
+        # The rate is that before the large grain is within two of its diameters of the top.
+        there = [np.flatnonzero(one > top - 2.0 * p["size_ratio"]) for one, top in zip(heights, tops, strict=True)]
+        rising = [one[: found[0]] if len(found) else one for one, found in zip(heights, there, strict=True)]
         values = {"rise": Value(over_chaotic(float(one[-1] - one[0]) for one in heights)),
-                  "rise_rate": Value(over_replicas([rate(until_top(*one, p["size_ratio"])) for one in zip(heights, tops, strict=True)]))}
+                  "rise_rate": Value(over_replicas([rate(one) for one in rising]))}
         return values, [curve("rise", "Height of the large grain", "height over the lowest grain (d)", heights)]
     parted = [np.array([segregation(kinds, frame[:, 1]) for frame in track]) for track, kinds in zip(tracks, large, strict=True)]
     values = {"segregation_start": Value(over_chaotic(float(one[0]) for one in parted)),
@@ -95,12 +98,6 @@ def unequal(tracks: list[Array], large: list[Kinds], p: Numbers) -> tuple[dict[s
         change = max((float(one[-1] - one[0]) for one in parted), key=abs)
         values["segregation_change"] = Value(exact(change), exact(0.0))
     return values, [curve("segregation", "Segregation", "(z̄ large − z̄ small)/H", parted)]
-
-
-def until_top(heights: Array, tops: Array, ratio: float) -> Array:
-    """The part of `heights` (periods,) before the large grain is within two of its diameters of the `tops`."""
-    there = np.flatnonzero(heights > tops - 2.0 * ratio)
-    return heights[: int(there[0])] if len(there) else heights
 
 
 def curve(name: str, title: str, across: str, series: list[Array]) -> Curve:

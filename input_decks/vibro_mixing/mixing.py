@@ -1,5 +1,5 @@
 """Mixing and segregation of grains of two kinds: Lacey's index, how far apart the kinds are in height, how fast either changes, and the
-drift beside the walls that carries grains round. `kinds` (n,) is true for the grains of one kind; they may be of one material, told apart
+drift at the walls that carries grains round. `kinds` (n,) is true for the grains of one kind; they may be of one material, told apart
 by where they once were."""
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dembark.postproc.statistics import block_mean, student
 
 Kinds = NDArray[np.bool_]
 
-# Width of the samples and of the zone beside a wall, in mean diameters.
+# Width of the samples and of the zone at a wall, in mean diameters.
 SAMPLE, BESIDE = 3.0, 2.0
 
 

@@ -1,4 +1,4 @@
-"""Hydrostatics, Archimedes, added mass, the contraction of a jet and what is conserved, beside a fluid of particles."""
+"""Hydrostatics, Archimedes, added mass, the contraction of a jet and what is conserved, in a fluid of particles."""
 
 import math
 from pathlib import Path
@@ -18,7 +18,7 @@ REFERENCE, LEVEL, PASSED = Path(__file__).with_name("reference") / "falling.csv"
 CONTRACTION = math.pi / (math.pi + 2.0)
 # The least width of a slot, over the spacing, that is judged.
 RESOLVED = 4
-# Of its momentum, what a block must give to the water for the sum of both to tell anything.
+# Of its momentum, what a block must give to the water for the sum of both to count.
 FELT = 0.01
 
 
@@ -59,7 +59,7 @@ def floating(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
 
 
 def falling(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
-    """The time between two places below the level, beside the experiment."""
+    """The time between two places below the level, in the run and the experiment."""
     rows, depth = run.times(), run.derived["depth"]
     times, heights = np.array([(float(row["time"]), float(row["height"])) for row in reference_rows(REFERENCE)]).T
     below = heights - LEVEL
@@ -101,7 +101,7 @@ def cylinder(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
 
 
 def slot(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
-    """The width that fits the volume which has flown out, beside the integral of CONTRACTION sqrt(2 g head)."""
+    """The width that fits the volume which has flown out, compared with the integral of CONTRACTION sqrt(2 g head)."""
     p, d = run.parameters, run.derived
     times = np.array([frame.step * run.time_step for frame in run.grains()])
     out = np.array([float((frame.positions[:, 1] < 0.0).sum()) for frame in run.grains()]) * d["spacing"] ** 2
@@ -119,7 +119,7 @@ def slot(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
 
 
 def drifting(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
-    """What momenta about the origin change, beside those of the block at the start."""
+    """Changes of the momenta about the origin, over those of the block at the start."""
     p, d, rows = run.parameters, run.derived, run.times()
     # Velocities (1, 1/2) and 1/size times the speed, about the centre.
     momentum, start = d["body_mass"] * p["speed"], d["body_inertia"] * p["speed"] / p["size"]
@@ -163,7 +163,7 @@ def measure(replicas: Replicas) -> Measurement:
 
 
 def study(name: str, points: Points, along: str) -> Measurement:
-    """The error at the finest spacing beside that at the coarsest."""
+    """The error at the finest spacing over that at the coarsest."""
     points, place = ordered(points, along)
     p = points[0]["parameters"]
     quantity, due = {"still": ("pressure_rms", 0.0), "floating": ("displaced_volume", p["body_density"] / p["fluid_density"]),
