@@ -1,8 +1,7 @@
-"""Measure coarse graining, compiled and in numpy: `python -m benchmarks.fields`.
+"""Measure coarse graining: `python -m benchmarks.fields`.
 
-One frame of a dense disordered packing (a simple cubic lattice with jitter, three contacts a grain) is spread onto a grid. numpy gets a
-share of the contacts and grains, picked at random, for all of them would take minutes; times a contact are compared. Wall time counts, and
-processor time is given, too, which says what a machine without other work would need at least.
+One frame of a dense disordered packing (a simple cubic lattice with jitter, three contacts a grain) is spread onto a grid. Wall time
+counts; processor time says what a machine without other work would need at least.
 """
 
 from __future__ import annotations
@@ -52,15 +51,6 @@ def packing(edge: int, seed: int = 1) -> tuple[GrainFrame, ContactFrame]:
     return grains, ContactFrame(0, place[pairs[:, 0]], branch, random.normal(size=branch.shape), pairs + 1)
 
 
-def share(grains: GrainFrame, contacts: ContactFrame, part: float, seed: int = 2) -> tuple[GrainFrame, ContactFrame]:
-    """A random `part` of the contacts, with all grains of them and no others."""
-    random = np.random.default_rng(seed)
-    chosen = np.sort(random.choice(len(contacts.ids), max(1, int(part * len(contacts.ids))), replace=False))
-    wanted = np.isin(grains.ids, contacts.ids[chosen])
-    kept = ContactFrame(0, contacts.first[chosen], contacts.branch[chosen], contacts.forces[chosen], contacts.ids[chosen])
-    return grains.select(wanted), kept
-
-
 def timed(grains: GrainFrame, contacts: ContactFrame, grid: Grid, kernel: str, width: float, **how: object) -> Sample:
     """Wall and processor seconds of one coarse graining, `width` in diameters, and wall time a contact (us)."""
     wall, processor = time.perf_counter(), time.process_time()
@@ -69,18 +59,16 @@ def timed(grains: GrainFrame, contacts: ContactFrame, grid: Grid, kernel: str, w
     return {"wall": wall, "processor": time.process_time() - processor, "each": 1e6 * wall / len(contacts.ids)}
 
 
-def measure(edge: int, cells: int, cases: Sequence[tuple[str, float]], rounds: int, part: float) -> pd.DataFrame:
-    """Samples of all kernels: compiled on one and on all threads, and numpy, once, on a `part` of the contacts."""
+def measure(edge: int, cells: int, cases: Sequence[tuple[str, float]], rounds: int) -> pd.DataFrame:
+    """Samples of all kernels, on one and on all threads."""
     everything = packing(edge)
-    few = share(*everything, part)
     grid = Grid(everything[0].low, everything[0].high, (cells,) * 3, (True,) * 3)
     found = []
     for kernel, width in cases:
         title = f"{kernel}, {width:g} d"
-        subjects = {f"compiled, {threads} threads": partial(timed, *everything, grid, kernel, width, threads=threads)
+        subjects = {f"{threads} threads": partial(timed, *everything, grid, kernel, width, threads=threads)
                     for threads in sorted({1, len(os.sched_getaffinity(0))})}
-        found += [frame.in_turn(title, subjects, rounds),
-                  frame.in_turn(title, {"numpy": partial(timed, *few, grid, kernel, width, backend="numpy")}, 1)]
+        found.append(frame.in_turn(title, subjects, rounds))
     return pd.concat(found, ignore_index=True)
 
 
@@ -89,17 +77,16 @@ def parsed(words: Sequence[str] | None) -> argparse.Namespace:
     parser = frame.parser("fields", __doc__, rounds=3)
     parser.add_argument("--edge", type=int, default=100, help="grains along an edge of the cube (100: 1e6 grains, 3e6 contacts)")
     parser.add_argument("--cells", type=int, default=64, help="cells along an edge of the grid")
-    parser.add_argument("--part", type=float, default=0.005, help="share of the contacts that numpy gets")
     given = parser.parse_args(words)
     frame.at_least_one(given, "cells")
-    if given.edge < 3 or not 0.0 < given.part <= 1.0:
-        raise DembarkError("--edge or --part out of range", "", "edge >= 3, 0 < part <= 1")
+    if given.edge < 3:
+        raise DembarkError("--edge out of range", "", "edge >= 3")
     return given
 
 
 def run(given: argparse.Namespace) -> None:
     """Measure, print and write the table."""
-    samples = measure(given.edge, given.cells, CASES, given.rounds, given.part)
+    samples = measure(given.edge, given.cells, CASES, given.rounds)
     rows = frame.summary(samples, ("wall", "processor", "each"))
     known = frame.facts(grains=given.edge**3, contacts=3 * given.edge**3, cells=given.cells**3, instruction_set=_fields.instruction_set())
     table = frame.markdown(("kernel, width", "by", "wall s", "processor s", "us a contact"),

@@ -8,14 +8,6 @@ from numpy.typing import NDArray
 
 def instruction_set() -> str: ...
 
-def finite(values: Annotated[NDArray[numpy.float64], dict(order='C', device='cpu', writable=False)], threads: int) -> bool:
-    """Whether all numbers are finite."""
-
-def link(ids: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], radii: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], wanted: Annotated[NDArray[numpy.int64], dict(shape=(None, None), order='C', device='cpu', writable=False)], branch: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], slack: float, threads: int, rows: Annotated[NDArray[numpy.int64], dict(shape=(None, None), order='C', device='cpu')], touching: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu')], touches: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')]) -> int:
-    """
-    Fill rows, touching and touches; the place in `wanted` of the first grain that is not there, or -1.
-    """
-
 class Target:
     def __init__(self, low: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], high: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], shape: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], edges: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], periodic: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], box_periodic: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], kind: int, width: float, reach: float, closed: bool, cell_place: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], cell_weight: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], threads: int) -> None: ...
 

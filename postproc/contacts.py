@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import NO_FLAGS, Array, ColumnsError, DumpError, RawFrame, integers, less_edges, numbered, take
-from dembark.postproc.dumps.opening import Trajectory, open_dump
-from dembark.postproc.dumps.typed import TypedDump
-from dembark.postproc.dumps.units import KEPT_UNITS, unit_style
+from .dumps.frames import NO_FLAGS, Array, ColumnsError, DumpError, RawFrame, integers, less_edges, numbered, take
+from .dumps.opening import Trajectory, open_dump
+from .dumps.typed import TypedDump
+from .dumps.units import KEPT_UNITS, unit_style
 
 Column = int | str | Sequence[int | str]
 

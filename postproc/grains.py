@@ -11,11 +11,11 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import NO_FLAGS, Array, DensityError, DumpError, RawFrame, cell, folded, integers, numbered, take
-from dembark.postproc.dumps.opening import Trajectory, open_dump
-from dembark.postproc.dumps.typed import TypedDump
-from dembark.postproc.dumps.units import KEPT_UNITS, in_si
-from dembark.postproc.spheres import volume
+from .dumps.frames import NO_FLAGS, Array, DensityError, DumpError, RawFrame, cell, folded, integers, numbered, take
+from .dumps.opening import Trajectory, open_dump
+from .dumps.typed import TypedDump
+from .dumps.units import KEPT_UNITS, in_si
+from .spheres import volume
 
 Column = TypeVar("Column")
 

@@ -42,6 +42,6 @@ def labelled(variables: Mapping[str, Any], coordinates: Mapping[str, Any], **att
 
 def write(path: Path, dataset: xarray.Dataset) -> Path:
     """Write `dataset` as NetCDF to `path`, at once or not at all; returns the path."""
-    from dembark.postproc.output.netcdf import write_netcdf
+    from .output.netcdf import write_netcdf
 
     return write_netcdf(path, dataset)

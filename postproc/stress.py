@@ -57,14 +57,6 @@ def on_plane(positions: Array, axis: int, place: Array | float) -> Array:
     return points
 
 
-def on_cylinder(positions: Array, radius: float) -> Array:
-    """Nearest points (n, 3) of the cylinder of `radius` (m) about the z axis."""
-    distance = np.hypot(positions[:, 0], positions[:, 1])
-    points = positions.copy()
-    points[:, :2] *= (radius / np.maximum(distance, 1e-300))[:, None]
-    return points
-
-
 def kinetic_stress(positions: Array, velocities: Array, masses: Array, axis: int, edges: Array, area: float) -> Array:
     """Kinetic stress (k, 3, 3) in Pa, sum m v' v' / V with v' about the mean velocity (by mass) of the grains centred in each slab."""
     cell = np.searchsorted(edges, positions[:, axis], side="right") - 1
@@ -88,25 +80,6 @@ def mean_load_above(heights: Array, loads: Array, edges: Array) -> Array:
     """The mean of `load_above` over each slab between `edges` (k + 1,), exactly; (k,)."""
     share = np.clip((heights[:, None] - edges[None, :-1]) / np.diff(edges)[None, :], 0.0, 1.0)
     return loads @ share
-
-
-def balance_stress(heights: Array, masses: Array, wall_lift: Array, levels: Array, area: float, gravity: float) -> Array:
-    """sigma_zz (k,) in Pa at `levels` (m): the weight above minus what the side walls carry above, over `area` (m2).
-
-    `wall_lift` (n,): vertical force of the side walls on each grain (N, up is positive).
-    """
-    return load_above(heights, masses * gravity - wall_lift, levels) / area
-
-
-def cylinder_wall_stress(positions: Array, wall_forces: Array, radius: float, edges: Array) -> tuple[Array, Array]:
-    """Normal stress (compression positive) and upward shear stress of a cylinder about z on the grains, (k,) each in Pa.
-
-    Both are forces over the area 2 pi R dz of the wall itself, r = R, not of the surface that the grains' centres reach.
-    """
-    distance = np.maximum(np.hypot(positions[:, 0], positions[:, 1]), 1e-300)
-    inward = -(wall_forces[:, 0] * positions[:, 0] + wall_forces[:, 1] * positions[:, 1]) / distance
-    area = 2.0 * np.pi * radius * np.diff(edges)
-    return _binned(positions[:, 2], inward, edges) / area, _binned(positions[:, 2], wall_forces[:, 2], edges) / area
 
 
 def plane_wall_stress(heights: Array, wall_forces: Array, axis: int, side: int, edges: Array, depth: float) -> tuple[Array, Array]:

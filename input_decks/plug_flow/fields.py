@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr
 
+from dembark.postproc.fields.accumulators import FieldSums
 from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.field_set import FieldSet
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import CUTOFF
-from dembark.postproc.fields.sums import Fields, FieldSums
 from dembark.postproc.labelled import labelled, variable, with_interval
 from dembark.postproc.measurement import Array, Measurement, Replica, Value
 from dembark.postproc.resampling import resampled
@@ -66,7 +67,7 @@ class Flow:
         blocks = replace(self.blocks, groups=np.arange(len(self.sums)))
         return resampled(lambda keep, _: measure(reduce(add, (one for one, kept in zip(self.sums, keep, strict=True) if kept))), blocks)
 
-    def scaled(self, fields: Fields) -> dict[str, Array]:
+    def scaled(self, fields: FieldSet) -> dict[str, Array]:
         """`fields` (cells between the walls, cells up) in units of d, v0 and Pa."""
         one, place, width = self.channel, fields.grid.centres(0), WIDTH * self.channel.diameter
         assert fields.stress is not None

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from dembark.postproc.dumps.frames import HINT, Array, ColumnsError, CutOffError, Dump, DumpError, Entry, RawFrame, before_tilt, numbered
-from dembark.postproc.dumps.source import Handle, Source
+from .frames import HINT, Array, ColumnsError, CutOffError, Dump, DumpError, Entry, RawFrame, before_tilt, numbered
+from .source import Handle, Source
 
 # Step, rows, whether the box is tilted, six words about its faces (0: periodic), its corners; the tilt; numbers a row, blocks.
 _START, _TILT, _END = struct.Struct("=qqi6i6d"), struct.Struct("=3d"), struct.Struct("=2i")

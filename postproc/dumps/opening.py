@@ -7,12 +7,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dembark.postproc.dumps.binary import BinaryDump
-from dembark.postproc.dumps.frames import ColumnsError, Dump
-from dembark.postproc.dumps.series import SeriesDump, files_of
-from dembark.postproc.dumps.source import Source
-from dembark.postproc.dumps.text import TextDump
-from dembark.postproc.dumps.vtk import VtkFile
+from .binary import BinaryDump
+from .frames import ColumnsError, Dump
+from .series import SeriesDump, files_of
+from .source import Source
+from .text import TextDump
+from .vtk import VtkFile
 
 Trajectory = str | Path | Sequence[str | Path]
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.postproc.dumps.frames import HINT, CutOffError, Dump, DumpError, Entry, RawFrame
-from dembark.postproc.dumps.vtk import BOX
+from .frames import HINT, CutOffError, Dump, DumpError, Entry, RawFrame
+from .vtk import BOX
 
 
 def files_of(path: str | Path | Sequence[str | Path]) -> Path | list[Path]:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.postproc.dumps.frames import CutOffError, DumpError
+from .frames import CutOffError, DumpError
 
 Handle = io.FileIO | gzip.GzipFile
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark._dumps import parse, skip
-from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, Entry, RawFrame, before_tilt, numbered
-from dembark.postproc.dumps.source import Source, Window
+
+from .frames import HINT, Array, CutOffError, Dump, DumpError, Entry, RawFrame, before_tilt, numbered
+from .source import Source, Window
 
 _ITEM = b"ITEM: "
 # Faults of a line, as the parser numbers them; the last begins the next frame.

@@ -11,8 +11,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import Array, Dump, DumpWarning, RawFrame
-from dembark.postproc.dumps.units import unit_style
+from .frames import Array, Dump, DumpWarning, RawFrame
+from .units import unit_style
 
 Frame = TypeVar("Frame")
 

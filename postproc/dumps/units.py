@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dembark.postproc.dumps.frames import DumpError, RawFrame
+from .frames import DumpError, RawFrame
 
 KEPT_UNITS = "columns {} stay in the units of the file, {}, for their dimension is not known"
 

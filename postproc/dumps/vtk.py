@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumps.frames import HINT, Array, CutOffError, Dump, DumpError, DumpWarning, Entry, RawFrame, numbered
-from dembark.postproc.dumps.source import Source
+from .frames import HINT, Array, CutOffError, Dump, DumpError, DumpWarning, Entry, RawFrame, numbered
+from .source import Source
 
 BOX = "boundingBox_"
 _AXES = ("x", "y", "z")

@@ -12,67 +12,28 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 from dembark.common.memory import check_memory
-from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.dumps.frames import cell
-from dembark.postproc.fields.coarse_graining import WallContacts, check_contacts
-from dembark.postproc.fields.grid import Grid, check_periods
-from dembark.postproc.fields.sums import full_tensor, ratio, symmetric_parts
-from dembark.postproc.grains import GrainFrame
-from dembark.postproc.spheres import volume
+
+from ..contacts import ContactFrame
+from ..dumps.frames import cell
+from ..grains import GrainFrame
+from ..spheres import volume
+from .accumulators import full_tensor, ratio, symmetric_parts
+from .coarse_graining import WallContacts, check_contacts
+from .field_set import FieldSet
+from .grid import Grid, check_periods
 
 Array = NDArray[np.float64]
 
+FIELDS = ("density", "solid_fraction", "velocity", "kinetic_stress", "contact_stress", "stress", "temperature", "grain_count",
+          "contact_count")
 LEAST_CONTACTS = 3000
 _BYTES = 400.0  # of the sums of a cell, and of what makes them
-
-
-@dataclass(frozen=True, eq=False)
-class CellAverage:
-    """Averages over the cells of `grid` and over `frames`; SI units, compression positive; NaN where `mask` is true.
-
-    `density`, `solid_fraction`, `temperature` are (nx, ny, nz), `velocity` has 3 and the stresses 3 by 3 components more. `grain_count`
-    and `contact_count` (nx, ny, nz) are summed over the frames; `mask` marks the cells with fewer contacts than asked for.
-    """
-
-    grid: Grid
-    frames: int
-    density: Array
-    solid_fraction: Array
-    velocity: Array
-    kinetic_stress: Array
-    contact_stress: Array
-    stress: Array
-    temperature: Array
-    grain_count: Array
-    contact_count: Array
-    mask: NDArray[np.bool_]
-
-    units: ClassVar[dict[str, str]] = {
-        "density": "kg m-3", "solid_fraction": "1", "velocity": "m s-1", "kinetic_stress": "Pa", "contact_stress": "Pa", "stress": "Pa",
-        "temperature": "m2 s-2", "grain_count": "1", "contact_count": "1",
-    }  # fmt: skip
-    long_names: ClassVar[dict[str, str]] = {
-        "density": "bulk density",
-        "solid_fraction": "volume of grains per volume",
-        "velocity": "mean velocity by mass",
-        "kinetic_stress": "kinetic stress, compression positive",
-        "contact_stress": "contact stress, compression positive",
-        "stress": "total stress, compression positive",
-        "temperature": "granular temperature",
-        "grain_count": "grains sampled, summed over frames",
-        "contact_count": "contacts sampled, summed over frames",
-    }
-
-    def arrays(self) -> dict[str, Array]:
-        """The averages by name."""
-        return {name: getattr(self, name) for name in self.units}
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +61,8 @@ class CellTotals:
         added = {item.name: getattr(self, item.name) + getattr(other, item.name) for item in fields(self) if item.name != "grid"}
         return CellTotals(self.grid, **added)
 
-    def average(self, least_contacts: int = LEAST_CONTACTS) -> CellAverage:
-        """The averages, masked where a cell has less than `least_contacts` contacts in all frames together."""
+    def average(self, least_contacts: int = LEAST_CONTACTS) -> FieldSet:
+        """The averages FIELDS, masked where a cell has less than `least_contacts` contacts in all frames together."""
         all_volume = self.frames * self.grid.cell_volume
         velocity = ratio(self.momentum, self.mass)
         kinetic = (full_tensor(self.energy) - np.nan_to_num(self.momentum[..., :, None] * velocity[..., None, :])) / all_volume
@@ -112,20 +73,13 @@ class CellTotals:
         def masked(values: Array) -> Array:
             return np.where(thin.reshape(*thin.shape, *(1,) * (values.ndim - 3)), np.nan, values)
 
-        return CellAverage(
-            grid=self.grid,
-            frames=self.frames,
-            density=masked(density),
-            solid_fraction=masked(self.volume / all_volume),
-            velocity=masked(velocity),
-            kinetic_stress=masked(kinetic),
-            contact_stress=masked(contact),
-            stress=masked(kinetic + contact),
-            temperature=masked(ratio(np.maximum(np.trace(kinetic, axis1=-2, axis2=-1), 0.0), 3.0 * density)),
-            grain_count=self.grains,
-            contact_count=self.contacts,
-            mask=thin,
-        )
+        values = {
+            "density": density, "velocity": velocity, "solid_fraction": self.volume / all_volume, "kinetic_stress": kinetic,
+            "temperature": ratio(np.maximum(np.trace(kinetic, axis1=-2, axis2=-1), 0.0), 3.0 * density), "contact_stress": contact,
+            "stress": kinetic + contact,
+        }
+        counts = {"grain_count": self.grains, "contact_count": self.contacts}
+        return FieldSet(self.grid, self.frames, {name: masked(one) for name, one in values.items()} | counts, thin)
 
 
 def cell_totals(grains: GrainFrame, contacts: ContactFrame | None, grid: Grid, walls: Sequence[WallContacts] = ()) -> CellTotals:
@@ -163,7 +117,7 @@ def cell_totals(grains: GrainFrame, contacts: ContactFrame | None, grid: Grid, w
 
 def cell_average(
     frames: Iterable[tuple[GrainFrame, ContactFrame | None]], grid: Grid, *, least_contacts: int = LEAST_CONTACTS
-) -> CellAverage:
+) -> FieldSet:
     """Averages over `frames` of (grains, contacts), read one at a time; DembarkError when there are none."""
     total: CellTotals | None = None
     for grains, contacts in frames:

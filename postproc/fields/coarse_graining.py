@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from dembark import _fields
 from dembark.common.errors import DembarkError
 from dembark.common.memory import check_memory
-from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.fields import sums as column
-from dembark.postproc.fields.carried import Contacts, Grains
-from dembark.postproc.fields.deposit import Spreader, zeros
-from dembark.postproc.fields.grid import Grid, check_periods
-from dembark.postproc.fields.kernels import Kernel
-from dembark.postproc.fields.sums import FieldSums
-from dembark.postproc.grains import GrainFrame
+
+from ..contacts import ContactFrame
+from ..dumps.frames import cell
+from ..grains import GrainFrame
+from . import accumulators as column
+from .accumulators import FieldSums
+from .grid import Grid, check_periods
+from .kernels import NAMES, Kernel, line_nodes, unit_gauss
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _IMAGE = 200.0  # bytes of a grain or contact, and of each of its periodic images, while it is spread
+_MOST_THREADS = 64
 _TOUCHING = 1e-6  # gap over the sum of the radii up to which spheres touch: what six digits of a dump leave
 
 
@@ -50,7 +54,6 @@ def coarse_grain(
     closed: bool = False,
     liquid: str = "liquid_volume",
     power: str = "dissipated_power",
-    backend: str = "native",
 ) -> FieldSums:
     """Sums of one frame over the cells of `grid`, with a `kernel` (gaussian, lucy, heaviside) of `width` (m).
 
@@ -61,47 +64,81 @@ def coarse_grain(
     `mean_velocity` (nx, ny, nz, 3) in m/s, for example of a first pass over all frames: velocity fluctuations are then those about it,
     interpolated to each grain. `liquid` names the column of grains and contacts with volumes of liquid (m3), `power` that of contacts
     with dissipated powers (W); without it the power is that of the contact forces on the relative velocity at the contact. `threads`:
-    all cores by default; the result is the same to the last bit for any number. `backend`: "native" (compiled) or "numpy" (slow, the
-    same to round-off). DembarkError says what of the input is wrong.
+    all cores by default; the result is the same to the last bit for any number. DembarkError says what of the input is wrong.
     """
     phi = Kernel(kernel, float(width))
+    if threads is not None and threads < 1:
+        raise DembarkError(f"{threads} threads", "coarse graining", "give at least 1")
     check_periods(grid, grains)
     check_contacts(contacts, grains)
     _check_room(grid, phi, grains, contacts)
-    spreader = Spreader(grid, phi, grains, closed, threads, backend)
-    workers = spreader.workers
-    _check_finite(grains.wrapped, "positions", grains.step, workers)
-    touching, pairs, touches = _linked(grains, contacts, workers) if backend == "native" else _touching(grains, contacts)
+    _check_finite(grains.step, positions=grains.wrapped, velocities=grains.velocities)
+    target = _target(grid, phi, grains, closed, threads)
+    touching, pairs = _touching(grains, contacts)
     sums = FieldSums(
-        grid,
-        phi,
-        1,
-        zeros(grid, column.GRAIN_COLUMNS),
-        None if contacts is None else zeros(grid, column.CONTACT_COLUMNS),
-        zeros(grid, 3),
-        peculiar=mean_velocity is not None,
+        grid, phi, 1, _zeros(grid, column.GRAIN_COLUMNS), None if contacts is None else _zeros(grid, column.CONTACT_COLUMNS),
+        _zeros(grid, 3), peculiar=mean_velocity is not None,
         liquid=liquid in grains.extra or (contacts is not None and liquid in contacts.extra),
-        power=contacts is not None and (power in contacts.extra or grains.has("omegas")),
-    )
-    _check_finite(grains.velocities, "velocities", grains.step, workers)
-    peculiar = grains.velocities if mean_velocity is None else grains.velocities - interpolate(mean_velocity, grid, grains.wrapped)
-    spreader.grains(
-        Grains(grains.wrapped, grains.masses, grains.radii, grains.velocities, peculiar, touches, grains.extra.get(liquid)), sums.grains
-    )
+        power=contacts is not None and (power in contacts.extra or grains.has("omegas")))
+    # Moments are taken about the middle of the grid, so that the second ones lose few digits.
+    target.grains(**_plain(
+        places=grains.wrapped, masses=grains.masses, radii=grains.radii, velocities=grains.velocities,
+        peculiar=grains.velocities if mean_velocity is None else grains.velocities - interpolate(mean_velocity, grid, grains.wrapped),
+        touches=np.bincount(pairs[touching].ravel(), minlength=len(grains.ids)).astype(float), liquid=grains.extra.get(liquid),
+        middle=0.5 * (grid.low + grid.high)), out=_rows(sums.grains))
     if contacts is not None and sums.contacts is not None:
-        for name in ("first", "branch", "forces"):
-            _check_finite(getattr(contacts, name), name, contacts.step, workers)
-        omegas = grains.omegas if grains.has("omegas") else None
-        spreader.contacts(
-            Contacts(
-                contacts.first, contacts.branch, contacts.forces, pairs, touching, grains.radii, grains.velocities, omegas,
-                contacts.extra.get(liquid), contacts.extra.get(power),
-            ),
-            sums.contacts,
-        )  # fmt: skip
+        _check_finite(contacts.step, first=contacts.first, branch=contacts.branch, forces=contacts.forces)
+        place, weight = line_nodes(phi, _longest(contacts.branch))
+        target.contacts(**_plain(
+            first=contacts.first, branch=contacts.branch, forces=contacts.forces, pairs=pairs, touching=touching, radii=grains.radii,
+            velocities=grains.velocities, omegas=grains.omegas if grains.has("omegas") else None, liquid=contacts.extra.get(liquid),
+            power=contacts.extra.get(power), place=place, weight=weight), out=_rows(sums.contacts))
     for wall in walls:
-        _add_wall(wall, sums, spreader)
+        branch = wall.points - wall.positions
+        _check_finite(grains.step, **{"wall points": wall.points, "wall positions": wall.positions, "wall forces": wall.forces})
+        if sums.contacts is not None:
+            values = np.zeros((len(branch), column.CONTACT_COLUMNS))
+            values[:, column.STRESS] = -(wall.forces[:, :, None] * branch[:, None, :]).reshape(-1, 9)
+            place, weight = line_nodes(phi, _longest(branch))
+            target.lines(**_plain(first=wall.positions, branch=branch, values=values, place=place, weight=weight), out=_rows(sums.contacts))
+        place, weight = line_nodes(phi, 0.0)
+        target.lines(**_plain(first=wall.points, branch=np.zeros_like(branch), values=wall.forces, place=place, weight=weight),
+                     out=_rows(sums.boundary))
     return sums
+
+
+def _target(grid: Grid, kernel: Kernel, frame: GrainFrame, closed: bool, threads: int | None) -> _fields.Target:
+    """What the compiled code spreads onto: all periodic images in the box of `frame` count. With `closed`, the shares of each place inside
+    the grid are scaled to sum to 1 within it, and places outside have none; otherwise what lies beyond the grid is lost."""
+    places, shares = unit_gauss(kernel.nodes_per_cell(grid))
+    cores = len(os.sched_getaffinity(0))
+    return _fields.Target(
+        low=grid.low, high=grid.high, shape=np.array(grid.shape, float), edges=cell(frame.low, frame.high, frame.tilt),
+        periodic=np.array(grid.periodic, float), box_periodic=np.array(frame.periodic, float), kind=NAMES.index(kernel.name),
+        width=kernel.width, reach=kernel.reach, closed=closed, cell_place=places, cell_weight=shares,
+        # More than a few for each core would only wait, and very many cannot be started.
+        threads=min(threads or cores, max(_MOST_THREADS, cores)))
+
+
+def _zeros(grid: Grid, columns: int) -> Array:
+    """Zeros (nx, ny, nz, columns), in memory as the compiled code fills them: a row of cells along z for each column."""
+    nx, ny, nz = grid.shape
+    return np.zeros((nx, ny, columns, nz)).transpose(0, 1, 3, 2)
+
+
+def _rows(out: Array) -> Array:
+    return out.transpose(0, 1, 3, 2)
+
+
+def _plain(**arrays: NDArray[Any] | None) -> dict[str, Any]:
+    """Arrays as the compiled code takes them: contiguous, of 8 bytes or flags."""
+    kept = (np.bool_, np.int64)
+    return {name: None if one is None else np.ascontiguousarray(one, one.dtype if one.dtype in kept else np.float64)
+            for name, one in arrays.items()}
+
+
+def _longest(branch: Array) -> float:
+    return float(np.sqrt(np.einsum("ij,ij->i", branch, branch).max())) if len(branch) else 0.0
 
 
 def check_contacts(contacts: ContactFrame | None, grains: GrainFrame) -> None:
@@ -140,38 +177,13 @@ def _check_room(grid: Grid, kernel: Kernel, grains: GrainFrame, contacts: Contac
     check_memory(bytes_of, what, "take fewer cells or a narrower kernel")
 
 
-def _add_wall(wall: WallContacts, sums: FieldSums, spreader: Spreader) -> None:
-    for name in ("points", "positions", "forces"):
-        _check_finite(getattr(wall, name), f"wall {name}", spreader.frame.step, spreader.workers)
-    if sums.contacts is not None:
-        branch = wall.points - wall.positions
-        values = np.zeros((len(branch), column.CONTACT_COLUMNS))
-        values[:, column.STRESS] = -(wall.forces[:, :, None] * branch[:, None, :]).reshape(-1, 9)
-        spreader.lines(wall.positions, branch, values, sums.contacts)
-    spreader.points(wall.points, wall.forces, sums.boundary)
-
-
-def _linked(grains: GrainFrame, contacts: ContactFrame | None, threads: int) -> tuple[NDArray[np.bool_], Index, Array]:
-    """What `_touching` gives, compiled."""
-    count = 0 if contacts is None else len(contacts.ids)
-    touching, pairs, touches = np.zeros(count, bool), np.zeros((count, 2), np.int64), np.zeros(len(grains.ids))
-    if contacts is not None and count:
-        wanted = np.ascontiguousarray(contacts.ids, np.int64)
-        ids, radii, branch = np.ascontiguousarray(grains.ids, np.int64), _doubles(grains.radii), _doubles(contacts.branch)
-        missing = _fields.link(ids, radii, wanted, branch, 1.0 + _TOUCHING, threads, pairs, touching, touches)
-        if missing >= 0:
-            raise _no_grain(wanted.ravel()[missing], contacts.step)
-    return touching, pairs, touches
-
-
-def _touching(grains: GrainFrame, contacts: ContactFrame | None) -> tuple[NDArray[np.bool_], Index, Array]:
-    """Which of m contacts touch (m,), the rows (m, 2) of their grains, and how many of them each of n grains has (n,)."""
+def _touching(grains: GrainFrame, contacts: ContactFrame | None) -> tuple[NDArray[np.bool_], Index]:
+    """Which of m contacts touch (m,), and the rows (m, 2) of their grains."""
     if contacts is None or len(contacts.ids) == 0:
-        return np.zeros(0, bool), np.zeros((0, 2), np.int64), np.zeros(len(grains.ids))
+        return np.zeros(0, bool), np.zeros((0, 2), np.int64)
     pairs = rows_of(grains.ids, contacts.ids, contacts.step)
     reach = (grains.radii[pairs[:, 0]] + grains.radii[pairs[:, 1]]) * (1.0 + _TOUCHING)
-    touching = np.einsum("ij,ij->i", contacts.branch, contacts.branch) <= reach**2
-    return touching, pairs, np.bincount(pairs[touching].ravel(), minlength=len(grains.ids)).astype(float)
+    return np.einsum("ij,ij->i", contacts.branch, contacts.branch) <= reach**2, pairs
 
 
 def rows_of(ids: Index, wanted: Index, step: int) -> Index:
@@ -187,12 +199,8 @@ def rows_of(ids: Index, wanted: Index, step: int) -> Index:
         rows = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
         found = ids[rows] == wanted
     if not found.all():
-        raise _no_grain(wanted[~found][0], step)
+        raise DembarkError(f"a contact of grain {wanted[~found][0]}", f"step {step}", "no such grain is in the grains of that step")
     return rows
-
-
-def _no_grain(number: int, step: int) -> DembarkError:
-    return DembarkError(f"a contact of grain {number}", f"step {step}", "no such grain is in the grains of that step")
 
 
 def interpolate(field: Array, grid: Grid, places: Array) -> Array:
@@ -202,32 +210,13 @@ def interpolate(field: Array, grid: Grid, places: Array) -> Array:
     """
     if field.shape[:3] != grid.shape:
         raise DembarkError(f"a mean velocity on {field.shape[:3]} cells", f"the grid has {grid.shape}", "give it on the grid of the fields")
-    known = np.nan_to_num(field)
-    lower, upper, share = [], [], []
-    for axis in range(3):
-        at = (places[:, axis] - grid.low[axis]) / grid.spacing[axis] - 0.5
-        count = grid.shape[axis]
-        if not grid.periodic[axis]:
-            at = np.clip(at, 0.0, count - 1)
-        below = np.floor(at).astype(int)
-        lower.append(below % count)
-        upper.append((below + 1) % count if grid.periodic[axis] else np.minimum(below + 1, count - 1))
-        share.append((at - below)[:, None])
-    result = np.zeros((len(places), field.shape[3]))
-    for corner in range(8):
-        sides = [(corner >> axis) & 1 for axis in range(3)]
-        cell = tuple((upper if side else lower)[axis] for axis, side in enumerate(sides))
-        weight = np.ones((len(places), 1))
-        for axis, side in enumerate(sides):
-            weight = weight * (share[axis] if side else 1.0 - share[axis])
-        result += weight * known[cell]
-    return result
+    known = np.pad(np.nan_to_num(field), [*((int(flag),) * 2 for flag in grid.periodic), (0, 0)], mode="wrap")
+    at = (places - grid.low) / grid.spacing - 0.5
+    at = np.where(grid.periodic, at % grid.shape + 1.0, at).T
+    return np.stack([map_coordinates(component, at, order=1, mode="nearest") for component in np.moveaxis(known, -1, 0)], axis=-1)
 
 
-def _check_finite(values: Array, name: str, step: int, threads: int) -> None:
-    if not _fields.finite(_doubles(values), threads):
-        raise DembarkError(f"{name} with numbers that are not finite", f"step {step}", "every number must be finite")
-
-
-def _doubles(values: Array) -> Array:
-    return np.ascontiguousarray(values, np.float64)
+def _check_finite(step: int, **arrays: Array) -> None:
+    for name, values in arrays.items():
+        if not np.isfinite(values).all():
+            raise DembarkError(f"{name} with numbers that are not finite", f"step {step}", "every number must be finite")

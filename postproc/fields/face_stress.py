@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BarycentricInterpolator
 
-from dembark.postproc.contacts import ContactFrame
-from dembark.postproc.fields.coarse_graining import WallContacts
-from dembark.postproc.fields.grid import Grid, check_periods, periodic_images
-from dembark.postproc.fields.kernels import Kernel, cumulative, unit_gauss
-from dembark.postproc.grains import GrainFrame
+from ..contacts import ContactFrame
+from ..grains import GrainFrame
+from .coarse_graining import WallContacts
+from .grid import Grid, check_periods, periodic_images
+from .kernels import Kernel, cumulative, unit_gauss
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.postproc.dumps.frames import cell
-from dembark.postproc.grains import GrainFrame
+
+from ..dumps.frames import cell
+from ..grains import GrainFrame
 
 Array = NDArray[np.float64]
 

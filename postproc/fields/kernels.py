@@ -16,21 +16,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import erf
 
 from dembark.common.errors import DembarkError
-from dembark.postproc.fields.grid import Grid
+
+from .grid import Grid
 
 Array = NDArray[np.float64]
 
 NAMES = ("gaussian", "lucy", "heaviside")
 CUTOFF = 3.0  # standard deviations at which the Gaussian is cut
 MAX_PANELS = 32
-
-
-def _erf(value: Array | float) -> Array:
-    from scipy.special import erf  # slow to import, and not needed before something is measured
-
-    return np.asarray(erf(value))
 
 
 @dataclass(frozen=True)
@@ -57,22 +53,8 @@ class Kernel:
         """Second moment along one axis (m2): the integral of x^2 phi."""
         if self.name == "gaussian":
             density = np.exp(-0.5 * CUTOFF**2) / np.sqrt(2.0 * np.pi)
-            return self.width**2 * (1.0 - 2.0 * CUTOFF * density / float(_erf(CUTOFF / np.sqrt(2.0))))
+            return self.width**2 * (1.0 - 2.0 * CUTOFF * density / float(erf(CUTOFF / np.sqrt(2.0))))
         return self.width**2 * (1.0 / 12.0 if self.name == "lucy" else 0.2)
-
-    def __call__(self, distance: Array) -> Array:
-        """phi (1/m3) at the vectors `distance` (..., 3) in m."""
-        if self.name == "gaussian":
-            norm = np.sqrt(2.0 * np.pi) * self.width * float(_erf(CUTOFF / np.sqrt(2.0)))
-            inside = (np.abs(distance) < self.reach).all(axis=-1)
-            return np.where(inside, np.exp(-0.5 * (distance**2).sum(axis=-1) / self.width**2) / norm**3, 0.0)
-        return self._radial(np.sqrt((distance**2).sum(axis=-1)))
-
-    def _radial(self, distance: Array) -> Array:
-        share = np.minimum(distance / self.width, 1.0)
-        if self.name == "lucy":
-            return 105.0 / (16.0 * np.pi * self.width**3) * (1.0 + 3.0 * share) * (1.0 - share) ** 3
-        return np.where(share < 1.0, 3.0 / (4.0 * np.pi * self.width**3), 0.0)
 
     @property
     def nodes_per_panel(self) -> int:
@@ -110,36 +92,4 @@ def line_nodes(kernel: Kernel, length: float) -> tuple[Array, Array]:
 def cumulative(kernel: Kernel, distance: Array) -> Array:
     """Integral of the Gaussian's factor of one axis from minus infinity to `distance` (m); 0 ... 1."""
     scaled = np.clip(distance / kernel.width, -CUTOFF, CUTOFF)
-    return 0.5 + 0.5 * _erf(scaled / np.sqrt(2.0)) / _erf(CUTOFF / np.sqrt(2.0))
-
-
-def ball_shares(kernel: Kernel, edges: tuple[Array, Array, Array], nodes: int) -> Array:
-    """Shares (p, a, b, c) of a spherical kernel about the origin in cells between `edges` ((p, a+1), (p, b+1), (p, c+1)) in m.
-
-    Gauss points in x within the part of a cell that the ball reaches, for each of them in the angle asin(y / chord), in which the chords
-    along z are smooth, for each of those in z (where Heaviside's kernel needs only the length). The shares are not yet normalised.
-    """
-    place, weight = unit_gauss(nodes)
-    radius = kernel.width
-
-    def along(edge: Array, chord: Array) -> tuple[Array, Array]:
-        """Gauss points and weights (..., cells, nodes) of the parts of cells between `edge` (..., cells + 1) within +-chord (...)."""
-        cut = np.clip(edge, -chord[..., None], chord[..., None])
-        length = np.diff(cut, axis=-1)[..., None]
-        return cut[..., :-1, None] + length * place, length * weight
-
-    x_edges, y_edges, z_edges = edges
-    x, x_weight = along(x_edges, np.full(len(x_edges), radius))
-    disc = np.sqrt(np.maximum(radius**2 - x**2, 0.0))[..., None]
-    share = np.divide(y_edges[:, None, None, :], disc, out=np.zeros((*disc.shape[:-1], y_edges.shape[1])), where=disc > 0.0)
-    angle, y_weight = along(np.arcsin(np.clip(share, -1.0, 1.0)), np.full(disc.shape[:-1], np.pi))
-    y, y_weight = disc[..., None] * np.sin(angle), disc[..., None] * np.cos(angle) * y_weight
-    flat = x[..., None, None] ** 2 + y**2
-    chord = np.sqrt(np.maximum(radius**2 - flat, 0.0))
-    z_edges = z_edges[:, None, None, None, None, :]
-    if kernel.name == "heaviside":
-        line = np.diff(np.clip(z_edges, -chord[..., None], chord[..., None]), axis=-1) * kernel(np.zeros(3))
-    else:
-        z, z_weight = along(z_edges, chord)
-        line = (kernel._radial(np.sqrt(flat[..., None, None] + z**2)) * z_weight).sum(axis=-1)
-    return np.einsum("pag,pagbh,pagbhc->pabc", x_weight, y_weight, line)
+    return np.asarray(0.5 + 0.5 * erf(scaled / np.sqrt(2.0)) / erf(CUTOFF / np.sqrt(2.0)))

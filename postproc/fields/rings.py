@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc import ContactFrame, GrainFrame, spheres
-from dembark.postproc.fields.coarse_graining import WallContacts
+from .. import ContactFrame, GrainFrame, spheres
+from .coarse_graining import WallContacts
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

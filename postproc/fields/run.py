@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import reduce
@@ -25,12 +25,12 @@ from ..sources import Selection, mean_diameter
 from ..walls import Inclusion, wall_contacts
 from ..walls.run import WallLoads, wall_lines
 from ..walls.stress import WallStress
-from .cells import CellAverage, cell_grid, cell_totals
+from .accumulators import MASS, MOMENTUM
+from .cells import FIELDS, cell_grid, cell_totals
 from .coarse_graining import WallContacts, coarse_grain
 from .field_set import FieldSet
 from .grid import Grid, cell_counts, extent
 from .kernels import Kernel
-from .sums import MASS, MOMENTUM, Fields
 
 Array = NDArray[np.float64]
 Attributes = Mapping[str, str | float | int]
@@ -73,7 +73,7 @@ class FieldAverages:
         if grid is not None and spacing is not None:
             raise DembarkError("--grid and --spacing are both given", "", "give one of them")
         self.chosen, self.cells, self.least_contacts, self.threads = chosen, cells, least_contacts, threads
-        self.only = _names(only, (CellAverage if cells else Fields).units)
+        self.only = _names(only, FIELDS if cells else FieldSet.units)
         self.groups, self.left_over = _groups(list(chosen.numbers), average)
         self.kernel = None if cells else Kernel(kernel, length(width, chosen.diameter, "--width"))
         self.walls = WallLoads(list(walls), chosen)
@@ -135,7 +135,7 @@ class FieldAverages:
         if self.kernel is None:
             totals = reduce(add, (cell_totals(grains, contacts, self.grid, touched) for grains, contacts, touched in frames))
             average = totals.average(self.least_contacts)
-            self.seen = min(self.seen, float(1.0 - average.mask.mean()))
+            self.seen = min(self.seen, float((totals.contacts >= self.least_contacts).mean()))
             self._balance(totals.mass, totals.momentum, sample)
             return average
         name, width = self.kernel.name, self.kernel.width
@@ -219,7 +219,7 @@ class FieldAverages:
         return Grid(low, high, shape, (bool(periodic[0]), bool(periodic[1]), bool(periodic[2])))
 
 
-def _names(text: str | None, known: Mapping[str, str]) -> list[str]:
+def _names(text: str | None, known: Collection[str]) -> list[str]:
     """Names of fields, separated by commas; DembarkError for one that does not exist."""
     names = [name.strip() for name in text.split(",")] if text else []
     for name in names:

@@ -9,7 +9,6 @@
 #include <stdexcept>
 
 #include "fields_deposit.hpp"
-#include "fields_input.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -20,9 +19,7 @@ namespace {
 using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Pairs = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Ids = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Flags = nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Numbers = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 using Field = nb::ndarray<double, nb::ndim<4>, nb::c_contig, nb::device::cpu>;
 
 void require(bool fits) {
@@ -125,31 +122,11 @@ class Target {
   int threads_;
 };
 
-bool numbers_finite(const Numbers& values, int threads) {
-  nb::gil_scoped_release release;
-  return all_finite(values.data(), std::int64_t(values.size()), std::max(1, threads));
-}
-
-std::int64_t link_contacts(const Ids& ids, const Vector& radii, const Pairs& wanted, const Rows& branch, double slack, int threads,
-                           const nb::ndarray<std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>& rows,
-                           const nb::ndarray<bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>& touching,
-                           const nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>& touches) {
-  const std::size_t n = ids.shape(0), m = wanted.shape(0);
-  require(n < (std::size_t(1) << 31) && radii.shape(0) == n && touches.shape(0) == n && wanted.shape(1) == 2 && rows.shape(0) == m &&
-          rows.shape(1) == 2 && branch.shape(0) == m && branch.shape(1) == 3 && touching.shape(0) == m);
-  const Links links{std::int64_t(n), std::int64_t(m), ids.data(), wanted.data(), radii.data(), branch.data(), slack};
-  nb::gil_scoped_release release;
-  return link(links, std::max(1, threads), rows.data(), touching.data(), touches.data());
-}
-
 }  // namespace
 
 NB_MODULE(_fields, module) {
   module.doc() = "Grains and contacts on a grid.";
   module.def("instruction_set", &instruction_set);
-  module.def("finite", &numbers_finite, "values"_a, "threads"_a, "Whether all numbers are finite.");
-  module.def("link", &link_contacts, "ids"_a, "radii"_a, "wanted"_a, "branch"_a, "slack"_a, "threads"_a, "rows"_a, "touching"_a,
-             "touches"_a, "Fill rows, touching and touches; the place in `wanted` of the first grain that is not there, or -1.");
   nb::class_<Target>(module, "Target")
       .def(nb::init<Vector, Vector, Vector, Rows, Vector, Vector, int, double, double, bool, Vector, Vector, int>(), "low"_a, "high"_a,
            "shape"_a, "edges"_a, "periodic"_a, "box_periodic"_a, "kind"_a, "width"_a, "reach"_a, "closed"_a, "cell_place"_a,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from packings import cubic_lattice, fcc_lattice, grain_frame, packing_at_rest, random_frame
 
 from dembark.common.errors import DembarkError
-from dembark.postproc.fields.cells import cell_average, cell_grid, cell_totals
+from dembark.postproc.fields.cells import FIELDS, cell_average, cell_grid, cell_totals
 from dembark.postproc.fields.grid import Grid
 
 
@@ -48,7 +48,7 @@ def test_thin_cells_are_masked_and_their_counts_kept():
     assert found.mask.any() and not found.mask.all()
     assert np.isnan(found.stress[found.mask]).all() and np.isfinite(found.stress[~found.mask]).all()
     assert (found.contact_count[found.mask] < 30).all() and (found.contact_count[~found.mask] >= 30).all()
-    assert set(found.arrays()) == set(found.long_names)
+    assert set(found.arrays()) == set(FIELDS)
 
 
 def test_walls_count_as_contacts():

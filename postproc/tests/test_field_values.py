@@ -10,17 +10,6 @@ from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import NAMES, Kernel
 
 
-def test_density_of_one_grain_is_the_mean_of_the_kernel_over_each_cell():
-    grains = grain_frame([[0.1, -0.2, 0.05]], masses=2.5)
-    grid = Grid((-1, -1, -1), (1, 1, 1), (5, 5, 5))
-    kernel = Kernel("gaussian", 0.3)
-    place, weight = np.polynomial.legendre.leggauss(30)
-    x, y, z = (0.2 * place + grid.centres(axis)[count] for axis, count in enumerate((2, 1, 3)))
-    inside = kernel(np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1) - grains.wrapped[0])
-    mean = 2.5 * np.einsum("abc,a,b,c", inside, weight, weight, weight) / 8.0
-    assert coarse_grain(grains, None, grid, width=0.3).fields().density[2, 1, 3] == pytest.approx(mean, rel=1e-12)
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_line_integral_is_the_mean_over_many_points(name):
     grains = grain_frame([[0.2, 0.3, 0.5], [0.75, 0.6, 0.4]], omegas=None)

@@ -25,32 +25,10 @@ def test_slices_add_up_to_whole_spheres(centres):
     assert (parts >= 0.0).all()
 
 
-def test_simple_cubic_packing_has_solid_fraction_pi_over_six():
+def test_surface_of_a_simple_cubic_packing():
     axis = np.arange(10) + 0.5
     place = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
-    found = profiles.solid_fraction_profile(place[:, 2], np.full(1000, 0.5), np.linspace(0, 10, 11), 100.0)
-    np.testing.assert_allclose(found, np.pi / 6.0, rtol=1e-12)
     assert profiles.surface_height(place[:, 2], np.full(1000, 0.5), 100.0) == pytest.approx(10.0, abs=0.6)
-
-
-def test_velocity_of_a_linear_profile_and_its_fluctuation():
-    random = np.random.default_rng(1)
-    place = random.uniform(0.0, 1.0, (40000, 3))
-    noise = random.normal(0.0, 0.3, len(place))
-    speed = np.column_stack([np.zeros(len(place)), np.zeros(len(place)), -2.0 * place[:, 0] + noise])
-    edges = np.linspace(0.05, 0.95, 10)
-    sums = profiles.cell_sums(place, speed, np.full(len(place), 1e-3), 0, edges)
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    np.testing.assert_allclose(sums.velocity()[:, 2], -2.0 * middle, atol=0.03)
-    np.testing.assert_allclose(sums.fluctuation()[:, 2], np.hypot(0.3, 0.2 / np.sqrt(12.0)), rtol=0.03)
-    twice = sums + sums
-    np.testing.assert_allclose(twice.velocity(), sums.velocity())
-    np.testing.assert_allclose(twice.solid_fraction(0.1), sums.solid_fraction(0.1))
-
-
-def test_window_counts_the_share_of_a_cut_grain():
-    sums = profiles.cell_sums(np.array([[0.0, 0.0, 0.0]]), np.ones((1, 3)), np.array([1.0]), 0, np.array([-2.0, 2.0]), window=(2, 0.0, 5.0))
-    assert sums.volume[0] == pytest.approx(0.5 * 4.0 / 3.0 * np.pi)
 
 
 def test_lagrangian_velocity_is_displacement_over_time():
@@ -109,18 +87,6 @@ def test_stress_of_a_periodic_chain_does_not_care_where_the_border_is():
     branch, forces = np.tile([1.0, 0.0, 0.0], (5, 1)), np.tile([-3.0, 0.0, 0.0], (5, 1))
     found = stress.pair_stress(first, branch, forces, 0, np.linspace(0, 5, 11), 2.0, length=5.0)
     np.testing.assert_allclose(found[:, 0, 0], 1.5)
-
-
-def test_uniform_pressure_on_a_cylinder():
-    angle, height = (grid.ravel() for grid in np.meshgrid(np.linspace(0, 2 * np.pi, 60, endpoint=False), np.arange(20) + 0.5))
-    radius, inside = 3.0, 2.5
-    place = np.column_stack([inside * np.cos(angle), inside * np.sin(angle), height])
-    each = 2.0 * np.pi * radius / 60.0
-    forces = np.column_stack([-5.0 * each * np.cos(angle), -5.0 * each * np.sin(angle), np.full(len(angle), 2.0 * each)])
-    normal, shear = stress.cylinder_wall_stress(place, forces, radius, np.linspace(0, 20, 11))
-    np.testing.assert_allclose(normal, 5.0)
-    np.testing.assert_allclose(shear, 2.0)
-    np.testing.assert_allclose(np.hypot(*stress.on_cylinder(place, radius)[:, :2].T), radius)
 
 
 def test_plane_wall_stress_has_the_side_it_presses():

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from dembark.postproc.fields.coarse_graining import coarse_grain
+from dembark.postproc.fields.field_set import FieldSet
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import Kernel
-from dembark.postproc.fields.sums import Fields
 from dembark.postproc.walls import PlaneWall
 from dembark.postproc.walls.patches import plane_patches
 from dembark.postproc.walls.stress import wall_stress
@@ -32,7 +32,7 @@ def residual(network: Network, kernel: str, width: float, spacing: float) -> tup
     return float(size.max()), float(np.sqrt((size[held] ** 2).mean()))
 
 
-def _fields(network: Network, kernel: str, width: float, spacing: float) -> Fields:
+def _fields(network: Network, kernel: str, width: float, spacing: float) -> FieldSet:
     margin = Kernel(kernel, width).reach + 2.0 * spacing
     count = int(np.ceil((1.0 + 2.0 * margin) / spacing))
     grid = Grid(np.full(3, -margin), np.full(3, count * spacing - margin), (count,) * 3)

@@ -52,8 +52,7 @@ def only(wrong, when):
 # What is given to coarse graining instead of the system, by the control's name.
 SPOILT = {
     "a grain without its mass": massless, "a lost contact": without_contact, "velocities a hundredth too large": faster,
-    "grains that jitter": jittering, "threads that skip a grain": only(massless, lambda options: options.get("threads", 1) > 1),
-    "a plain implementation that skips a grain": only(massless, lambda options: options.get("backend") == "numpy")}
+    "grains that jitter": jittering, "threads that skip a grain": only(massless, lambda options: options.get("threads", 1) > 1)}
 
 
 # What another fluid is made with.
