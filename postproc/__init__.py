@@ -7,7 +7,7 @@ hold the fields.
 from typing import TYPE_CHECKING, Any
 
 from .contacts import ContactFrame, ContactsDump
-from .dumptext import DumpError, DumpWarning, TextDump, open_dump
+from .dumps import DumpError, DumpWarning, TextDump, open_dump
 from .grains import GrainFrame, GrainsDump
 from .history import read_times
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .dumptext import DumpError
+from .dumps import DumpError
 
 
 def read_times(path: str | Path) -> dict[str, NDArray[np.float64]]:

@@ -14,7 +14,7 @@ from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 
 from .contacts import ContactFrame, ContactsDump
-from .dumptext import DumpError
+from .dumps import DumpError
 from .grains import GrainFrame, GrainsDump
 from .walls import CylinderWall, Motion, PlaneWall, Wall
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -22,12 +23,12 @@ _KEPT = ("columns", "density", "skip_truncated", "units", "varying")
 
 
 class _Grains:
-    """A dump with the grains that ever occur in it, and the frame that was read last: topology and trajectory ask for the same."""
+    """A dump with the grains that ever occur in it, and the frame that was read last: topology and trajectory need the same."""
 
     def __init__(self, filename: str | Path, options: dict[str, Any]) -> None:
         self.dump = GrainsDump(filename, **{name: value for name, value in options.items() if name in _KEPT and name != "varying"})
         if len(self.dump) == 0:
-            raise DumpError(f"{filename} has no whole frame")
+            raise DumpError(f"{filename} has no complete frame")
         self._held: tuple[int, GrainFrame] = (0, self.dump[0])
         self.roster = _roster(self.dump, self._held[1], options.get("varying"))
 
@@ -37,23 +38,16 @@ class _Grains:
         return self._held[1]
 
 
-# The reader of a file comes right after the parser of its topology, which leaves here what it has found.
-_left: list[tuple[object, _Grains]] = []
+@lru_cache(maxsize=1)
+def _opened(filename: str, _stamp: object, options: tuple[tuple[str, Any], ...]) -> _Grains:
+    """The dump; the reader of a file comes right after the parser of its topology. `_stamp` changes when the file does."""
+    return _Grains(filename, dict(options))
 
 
-def _key(filename: str | Path, options: dict[str, Any]) -> object:
+def _grains(filename: str | Path, options: dict[str, Any]) -> _Grains:
     stat = Path(filename).stat() if Path(filename).is_file() else None
-    return str(filename), stat and (stat.st_size, stat.st_mtime_ns), repr([(name, options[name]) for name in _KEPT if name in options])
-
-
-def _leave(filename: str | Path, options: dict[str, Any]) -> _Grains:
-    _left[:] = [(_key(filename, options), _Grains(filename, options))]
-    return _left[0][1]
-
-
-def _take(filename: str | Path, options: dict[str, Any]) -> _Grains:
-    key, found = _left.pop() if _left else (None, None)
-    return found if found is not None and key == _key(filename, options) else _Grains(filename, options)
+    kept = tuple((name, tuple(value) if isinstance(value := options[name], list) else value) for name in _KEPT if name in options)
+    return _opened(str(filename), stat and (stat.st_size, stat.st_mtime_ns), kept)
 
 
 def _roster(dump: GrainsDump, first: GrainFrame, varying: bool | None) -> dict[str, NDArray[Any]]:
@@ -85,7 +79,7 @@ class GrainsParser(TopologyReaderBase):
 
     def parse(self, **kwargs: Any) -> Topology:
         """Topology with one residue and one segment."""
-        grains = _leave(self.filename, kwargs).roster
+        grains = _grains(self.filename, kwargs).roster
         attributes = [
             topologyattrs.Atomids(grains["ids"]),
             topologyattrs.Atomtypes(grains["types"].astype(str).astype(object)),
@@ -104,7 +98,7 @@ class GrainsReader(ReaderBase):
 
     `ts.positions`, `ts.velocities`, `ts.forces` are what MDAnalysis works with; the double-precision originals and everything else
     (`omegas`, `wall_forces`, `radii`, `extra`, ...) are in `ts.data["frame"]`, a GrainFrame. Where grains come and go, the atoms are all
-    that ever occur; `ts.data["present"]` (n,) tells which are there, the others have NaN for positions, velocities and forces.
+    that ever occur; `ts.data["present"]` (n,) marks those that are there, the others have NaN for positions, velocities and forces.
     """
 
     format = "DEMGRAINS"
@@ -112,13 +106,13 @@ class GrainsReader(ReaderBase):
 
     @store_init_arguments
     def __init__(self, filename: str | Path, time_step: float = 1.0, wrapped: bool = False, **kwargs: Any) -> None:
-        """`time_step` (s) of the simulation turns steps into `ts.time` where the dump has no times of its own; `wrapped` asks for the
-        positions inside the box.
+        """`time_step` (s) of the simulation turns steps into `ts.time` where the dump has no times; with `wrapped`, positions are
+        inside the box.
 
         Further: `columns`, `density`, `skip_truncated`, `units` of GrainsDump; `varying` says that grains come and go though their number
         stays.
         """
-        self._grains = _take(filename, kwargs)
+        self._grains = _grains(filename, kwargs)
         steps, times = self._grains.dump.steps, self._grains.dump.times
         self._times = times if np.isfinite(times).all() else steps * time_step
         kwargs.setdefault("dt", float(self._times[1] - self._times[0]) if len(steps) > 1 else time_step)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.postproc.dumptext import DumpError
+from dembark.postproc.dumps import DumpError
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.postproc import DumpError
-from dembark.postproc.dumptext import TextDump
+from dembark.postproc.dumps import TextDump
 from dembark.postproc.measurement import Value, number, profile
 from dembark.postproc.replica import Array, Replica, once
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +17,6 @@ from .source import Handle, Source
 # Step, rows, whether the box is tilted, six words about its faces (0: periodic), its corners; the tilt; numbers a row, blocks.
 _START, _TILT, _END = struct.Struct("=qqi6i6d"), struct.Struct("=3d"), struct.Struct("=2i")
 _BLOCK = struct.Struct("=i")
-_FACES = range(4)
 # Another format begins with a name and its length, negative.
 _FOREIGN = (b"DUMPCUSTOM", b"DUMPATOM")
 
@@ -43,128 +43,86 @@ class BinaryDump(Dump):
             raise DumpError(f"{path} is a binary dump of a format that is not read; write a text dump")
         try:
             with self._source.at(0) as handle:
-                head = self._header(handle)
-        except (DumpError, ValueError):
-            head = None
-        if head is None:
-            raise DumpError(f"{path} does not begin with 'ITEM: TIMESTEP', nor as a binary dump does")
+                width = self._words(handle).width
+        except ValueError:
+            raise DumpError(f"{path} does not begin with 'ITEM: TIMESTEP', nor as a binary dump does") from None
         if columns is None:
             advice = "give columns=, the words of the deck's dump command"
-            raise ColumnsError(f"{path} is binary and does not name its {head.width} columns; {advice}")
+            raise ColumnsError(f"{path} is binary and does not name its {width} columns; {advice}")
         self._columns = tuple(columns)
         super().__init__(Path(path), skip_truncated=skip_truncated, stream=stream, units=units)
 
-    def _words(self, handle: Handle, form: struct.Struct) -> tuple[Any, ...] | None:
+    def _take(self, handle: Handle, form: struct.Struct) -> tuple[Any, ...]:
         room = bytearray(form.size)
-        read = self._source.fill(handle, memoryview(room))
-        if read == 0:
-            return None
-        if read < form.size:
+        if self._source.fill(handle, memoryview(room)) < form.size:
             raise CutOffError
         return form.unpack(room)
 
-    def _header(self, handle: Handle) -> _Header | None:
-        """The header at the handle, or None at the end of the file; ValueError when it is none."""
-        start = self._words(handle, _START)
-        if start is None:
-            return None
-        step, count, tilted, *rest = start
-        if step < 0 or count < 0 or tilted not in (0, 1) or any(face not in _FACES for face in rest[:6]):
+    def _words(self, handle: Handle) -> _Header:
+        """The header at the handle; ValueError when it is none, CutOffError when it is cut off."""
+        step, count, tilted, *rest = self._take(handle, _START)
+        faces, bounds = np.array(rest[:6]).reshape(3, 2), np.array(rest[6:]).reshape(3, 2)
+        if step < 0 or count < 0 or tilted not in (0, 1) or not ((faces >= 0) & (faces < 4)).all() or not np.isfinite(bounds).all():
             raise ValueError
-        tilt = self._words(handle, _TILT) if tilted else (0.0, 0.0, 0.0)
-        end = self._words(handle, _END)
-        if tilt is None or end is None:
-            raise CutOffError
-        width, blocks = end
-        bounds = np.array(rest[6:]).reshape(3, 2)
-        if width < 1 or blocks < 1 or not np.isfinite(bounds).all():
+        tilt = np.array(self._take(handle, _TILT) if tilted else (0.0, 0.0, 0.0))
+        width, blocks = self._take(handle, _END)
+        if width < 1 or blocks < 1:
             raise ValueError
-        periodic = np.array([rest[2 * axis] == rest[2 * axis + 1] == 0 for axis in range(3)])
-        return _Header(step, count, periodic, (*before_tilt(bounds[:, 0], bounds[:, 1], np.array(tilt)), np.array(tilt)), width, blocks)
+        return _Header(step, count, (faces == 0).all(axis=1), (*before_tilt(bounds[:, 0], bounds[:, 1], tilt), tilt), width, blocks)
 
-    def _find(self) -> Iterator[Entry]:
-        with self._source.at(0) as handle:
-            number, place = 1, 0
-            while True:
-                step, count, fault = -1, 0, f"truncated in its header ({HINT})"
-                try:
-                    head = self._checked(handle, number)
-                    if head is None:
-                        return
-                    step, count, fault = head.step, head.count, f"truncated, not all of its {head.count} rows are there ({HINT})"
-                    for _ in range(head.blocks):
-                        length = self._words(handle, _BLOCK)
-                        if length is None or not self._source.reach(handle, handle.tell() + 8 * length[0]):
-                            raise CutOffError
-                except CutOffError:
-                    yield Entry(place, 0, 0, number, step, count, fault)
-                    return
-                yield Entry(place, 0, handle.tell() - place, number, step, count)
-                number, place = number + 1, handle.tell()
-
-    def _checked(self, handle: Handle, number: int) -> _Header | None:
-        where = f"{self.path}, frame {number}"
+    def _header(self, handle: Handle, where: str) -> _Header:
         try:
-            head = self._header(handle)
-        except ValueError as error:
-            if isinstance(error, CutOffError):
-                raise
+            head = self._words(handle)
+        except CutOffError:
+            raise
+        except ValueError:
             raise DumpError(f"{where}: header cannot be read") from None
-        if head is not None and head.width != len(self._columns):
+        if head.width != len(self._columns):
             raise ColumnsError(f"{where}: has {head.width} columns, but columns= names {len(self._columns)}")
         return head
 
+    def _find(self) -> Iterator[Entry]:
+        with Source(self.path).at(0) as handle:
+            for number in itertools.count(1):
+                place, step, count, fault = handle.tell(), -1, 0, f"truncated in its header ({HINT})"
+                try:
+                    head = self._header(handle, f"{self.path}, frame {number}")
+                    step, count, fault = head.step, head.count, f"truncated, not all of its {head.count} rows are there ({HINT})"
+                    for _ in range(head.blocks):
+                        (length,) = self._take(handle, _BLOCK)
+                        if not self._source.reach(handle, handle.tell() + 8 * length):
+                            raise CutOffError
+                except CutOffError:
+                    if step >= 0 or handle.tell() > place:
+                        yield Entry(place, 0, 0, number, step, count, fault)
+                    return
+                yield Entry(place, 0, handle.tell() - place, number, step, count)
+
     def _read(self, entry: Entry, columns: Sequence[str] | None) -> RawFrame:
+        where, names = f"{self.path}, frame {entry.number}", self._columns
         with self._source.at(entry.place) as handle:
             try:
-                frame = self._frame(handle, entry.number, columns)
+                head = self._header(handle, where)
+                values = np.empty((head.count, head.width))
+                room, filled = values.data.cast("B") if values.size else memoryview(b""), 0
+                for _ in range(head.blocks):
+                    (length,) = self._take(handle, _BLOCK)
+                    part = room[filled : filled + 8 * length]
+                    if len(part) < 8 * length:
+                        raise DumpError(f"{where}: its blocks hold more than {head.count} rows")
+                    if self._source.fill(handle, part) < len(part):
+                        raise CutOffError
+                    filled += len(part)
             except CutOffError:
-                frame = None
-        if frame is None or frame.step != entry.step:
-            raise DumpError(f"{self.path}, frame {entry.number}: the file was changed since it was opened")
-        return frame
-
-    def _frame(self, handle: Handle, number: int, columns: Sequence[str] | None = None) -> RawFrame | None:
-        where = f"{self.path}, frame {number}"
-        head = self._checked(handle, number)
-        if head is None:
-            return None
-        values = np.empty((head.count, head.width))
-        room, filled = values.data.cast("B") if values.size else memoryview(b""), 0
-        for _ in range(head.blocks):
-            length = self._words(handle, _BLOCK)
-            if length is None:
-                raise CutOffError
-            end = filled + 8 * length[0]
-            if not filled <= end <= len(room):
-                raise DumpError(f"{where}: its blocks hold more than {head.count} rows")
-            while filled < end:
-                read = self._source.fill(handle, room[filled:end])
-                if read == 0:
-                    raise CutOffError
-                filled += read
+                head = None
+        if head is None or head.step != entry.step:
+            raise DumpError(f"{where}: the file was changed since it was opened")
         if filled != len(room):
             raise DumpError(f"{where}: its blocks hold fewer than {head.count} rows")
         if not np.isfinite(values.sum()) and len(bad := np.argwhere(~np.isfinite(values))):
             row, column = bad[0]
-            what = f"column {self._columns[column]} holds a number that is not finite, '{values[row, column]}'"
-            raise DumpError(f"{where}, row {row + 1}: {what}")
-        names = self._columns
+            raise DumpError(f"{where}, row {row + 1}: column {names[column]} holds a number that is not finite, '{values[row, column]}'")
         if columns is not None:
             values, names = values[:, numbered(names, columns, where)], tuple(columns)
         low, high, tilt = head.box
         return RawFrame(head.step, low, high, head.periodic, names, values, tilt)
-
-    def _stream(self) -> Iterator[RawFrame]:
-        with self._source.at(0) as handle:
-            number = 1
-            while True:
-                try:
-                    frame = self._frame(handle, number)
-                except CutOffError:
-                    self._cut_off(f"{self.path}, frame {number}: truncated ({HINT})")
-                    return
-                if frame is None:
-                    return
-                yield frame
-                number += 1

@@ -43,10 +43,6 @@ class CutOffError(DumpError):
     """A frame that ends too early."""
 
 
-class UnknownLengthError(DumpError, TypeError):
-    """The length of a dump that is streamed; as a TypeError it does not keep list() from reading."""
-
-
 class DumpWarning(UserWarning):
     """A dump that was read, but not as it stands; the message is one line."""
 
@@ -112,7 +108,7 @@ class Dump(ABC):
     A restarted run may write steps again: of frames with equal steps the one later in the file is kept, which DumpWarning says. A last
     frame that was cut off is refused, or left out with `skip_truncated=True`; `truncated` then says so in one line. `remarks` holds all
     such lines. With `stream=True` nothing is searched beforehand: iterating yields the first frame at once and refuses steps that go
-    back; whatever else is asked for makes the index then.
+    back; any other use makes the index.
 
     `ITEM: UNITS` stands once in a file, or once in a series of files, and holds for all frames; `units` are those of a file without it.
     """
@@ -210,9 +206,7 @@ class Dump(ABC):
         return np.array([entry.count if entry.count >= 0 else len(self._read(entry, None).values) for entry in self._entries], np.int64)
 
     def __len__(self) -> int:
-        if self._index is None:
-            raise UnknownLengthError(f"{self.path}: how many frames there are is not known with stream=True; call refresh() first")
-        return len(self._index)
+        return len(self._entries)
 
     def __iter__(self) -> Iterator[RawFrame]:
         if self._index is None:
@@ -227,20 +221,23 @@ class Dump(ABC):
         return replace(self._read(entry, columns), units=self._units)
 
     def _forward(self) -> Iterator[RawFrame]:
-        last: RawFrame | None = None
-        units = self._given
-        for number, frame in enumerate(self._stream(), 1):
-            where = f"{self.path}, frame {number}"
-            if last is not None and frame.step <= last.step:
-                raise DumpError(f"{where}: step {frame.step} comes after step {last.step}; open it without stream=True")
-            units = units or (frame.units if last is None else "")
-            if last is not None and frame.time is not None and last.time is not None and frame.time < last.time:
-                raise DumpError(f"{where}: time {frame.time:.9g} comes after time {last.time:.9g}, though the step is later")
-            if frame.units not in ("", units):
-                raise DumpError(f"{where}: its units are {frame.units}, but those before are {units or 'not named'}; "
+        last, units = None, self._given
+        for entry in self._find():
+            where = self._where(entry)
+            if entry.fault:
+                self._cut_off(f"{where}: {entry.fault}")
+                continue
+            if last is None:
+                units = units or entry.units
+            elif entry.step <= last.step:
+                raise DumpError(f"{where}: step {entry.step} comes after step {last.step}; open it without stream=True")
+            elif entry.time is not None and last.time is not None and entry.time < last.time:
+                raise DumpError(f"{where}: time {entry.time:.9g} comes after time {last.time:.9g}, though the step is later")
+            if entry.units not in ("", units):
+                raise DumpError(f"{where}: its units are {entry.units}, but those before are {units or 'not named'}; "
                                 "open it without stream=True")
-            yield replace(frame, units=units)
-            last = frame
+            yield replace(self._read(entry, None), units=units)
+            last = entry
 
     @abstractmethod
     def _find(self) -> Iterator[Entry]:
@@ -249,10 +246,6 @@ class Dump(ABC):
     @abstractmethod
     def _read(self, entry: Entry, columns: Sequence[str] | None) -> RawFrame:
         """The frame of an entry."""
-
-    @abstractmethod
-    def _stream(self) -> Iterator[RawFrame]:
-        """All frames as they stand in the file, without an index."""
 
 
 def numbered(columns: Sequence[str], wanted: Sequence[str] | None, where: str) -> list[int]:

@@ -1,4 +1,4 @@
-"""Any trajectory as a Dump, told by its content."""
+"""Any trajectory as a Dump, recognised by its content."""
 
 from __future__ import annotations
 

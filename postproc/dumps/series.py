@@ -71,11 +71,6 @@ class SeriesDump(Dump):
     def _read(self, entry: Entry, columns: Sequence[str] | None) -> RawFrame:
         return self._filled(self._open_one(self._files[entry.file])._read(entry, columns), columns)
 
-    def _stream(self) -> Iterator[RawFrame]:
-        for path in self._files:
-            for raw in self._open_one(path)._stream():
-                yield self._filled(raw, None)
-
     def _filled(self, raw: RawFrame, columns: Sequence[str] | None) -> RawFrame:
         """The frame; one without rows whose file names no columns has those of the others."""
         if raw.columns or len(raw.values):
@@ -88,7 +83,8 @@ class SeriesDump(Dump):
         """The columns of the first file that names them; () when none does."""
         for path in self._files:
             with suppress(CutOffError):
-                for raw in self._open_one(path)._stream():
-                    if raw.columns:
-                        return raw.columns
+                one = self._open_one(path)
+                for entry in one._find():
+                    if columns := one._read(entry, None).columns:
+                        return columns
         return ()

@@ -95,14 +95,12 @@ class Source:
             raise DumpError(f"{self.path}: its compression is damaged ({error})") from None
 
     def fill(self, handle: Handle, room: memoryview) -> int:
-        """Read into `room`; how many bytes came, 0 at the end. A gzipped file that was cut off just ends."""
-        if isinstance(handle, io.FileIO):
-            return handle.readinto(room) or 0
-        filled = 0
+        """Read into `room`; how many bytes came, fewer at the end. A gzipped file that was cut off just ends."""
+        filled, read = 0, handle.readinto if isinstance(handle, io.FileIO) else handle.readinto1
         with self._damage():
             try:
-                while filled < len(room) and (read := handle.readinto1(room[filled:])):
-                    filled += read
+                while filled < len(room) and (more := read(room[filled:])):
+                    filled += more
             except EOFError:
                 pass
         return filled

@@ -126,7 +126,8 @@ class TextDump(Dump):
         return head
 
     def _find(self) -> Iterator[Entry]:
-        with self._source.window() as window:
+        # A source of its own: frames may be read meanwhile.
+        with Source(self.path).window() as window:
             number = 1
             while window.pass_blank():
                 entry = self._pass(window, number)
@@ -180,11 +181,7 @@ class TextDump(Dump):
         names = tuple(head.columns[index] for index in numeric) if columns is None else tuple(dict.fromkeys(columns))
         chosen = numeric if columns is None else numbered(head.columns, names, where)
         place = [chosen.index(index) if index in chosen else -1 for index in range(len(head.columns))]
-        try:
-            values = np.empty((head.count, len(names)))
-        except (MemoryError, ValueError):
-            raise DumpError(f"{where}: its {head.count} lines do not fit into memory") from None
-        rows = 0
+        values, rows = np.empty((head.count, len(names))), 0
         while rows < head.count:
             begin, more, fault, column = parse(window.data, window.begin, window.end, place, values, rows)
             window.pass_over(begin, more)
@@ -203,18 +200,3 @@ class TextDump(Dump):
             return f"{where}: a line does not hold {len(columns)} numbers but {len(words)}"
         what = "no number" if fault == _WORD else "a number that is not finite"
         return f"{where}: column {columns[column]} holds {what}, '{words[column]}'"
-
-    def _stream(self) -> Iterator[RawFrame]:
-        with self._source.window() as window:
-            number = 1
-            while window.pass_blank():
-                try:
-                    frame = self._rows(window, self._header(window, number), number)
-                except CutOffError as error:
-                    if window.line() is not None:
-                        said = str(error).replace(f" ({HINT})", "")
-                        raise DumpError(f"{said}, but the file goes on; open it without stream=True") from None
-                    self._cut_off(str(error))
-                    return
-                yield frame
-                number += 1

@@ -141,6 +141,3 @@ class VtkFile(Dump):
             row, column = bad[0]
             raise DumpError(f"{self.path}, row {row + 1}: array {names[column]} holds a number that is not finite, '{values[row, column]}'")
         return RawFrame(self._step, low, high, np.zeros(3, bool), names, values, tilt, flagged=False)
-
-    def _stream(self) -> Iterator[RawFrame]:
-        yield self._read(Entry(0, 0, 0, 1, self._step, -1), None)

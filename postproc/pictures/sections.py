@@ -20,7 +20,7 @@ from PIL import Image, ImageDraw
 from dembark.common.files import read_json
 
 from .. import DumpError, GrainFrame, GrainsDump
-from ..dumptext import TextDump
+from ..dumps import TextDump
 from ..history import read_times
 from ..style import STYLE
 from ..walls.mesh import cut, read_stl

@@ -101,7 +101,7 @@ def test_units_that_contradict_each_other_are_refused(tmp_path, frames):
         with pytest.raises(DumpError, match=r"frame 2: its units are si, but .*frame 1 says cgs"):
             GrainsDump(path)
     with pytest.raises(DumpError, match=r"frame 2: its units are (si|cgs), but those before are (cgs|not named)"):
-        list(GrainsDump(path, stream=True))
+        [*iter(GrainsDump(path, stream=True))]
     with pytest.raises(DumpError, match="its units are"):
         GrainsDump(path, units="metal")
 

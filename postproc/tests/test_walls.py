@@ -12,7 +12,7 @@ from dembark.common.errors import DembarkError
 from dembark.postproc import DumpError
 from dembark.postproc.statistics import block_mean
 from dembark.postproc.walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, into_box, wall_contacts
-from dembark.postproc.walls.mesh import TriangleTree, read_stl
+from dembark.postproc.walls.mesh import nearest, read_stl, surface_of
 from dembark.postproc.walls.patches import box_patches, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
 from dembark.postproc.walls.peaks import Blocks, Histogram, PeakFinder
 from dembark.postproc.walls.stress import wall_stress
@@ -72,7 +72,7 @@ def test_tree_finds_what_comparing_all_triangles_finds(seed, count):
     sizes = 10.0 ** random.uniform(-3, 0.5, (count, 1, 1))
     triangles = random.uniform(-1.0, 1.0, (count, 1, 3)) + sizes * random.normal(size=(count, 3, 3))
     points = random.uniform(-2.0, 2.0, (40, 3))
-    found, which = TriangleTree(triangles).nearest(points)
+    found, which = nearest(surface_of(triangles), points)
     every = distances_of_all(points, triangles)
     np.testing.assert_allclose(np.linalg.norm(found - points, axis=1), every.min(axis=1), rtol=0, atol=1e-11)
     np.testing.assert_allclose(every[np.arange(40), which], every.min(axis=1), rtol=0, atol=1e-11)
@@ -85,9 +85,9 @@ def test_tree_of_a_flat_mesh_and_points_far_from_it(axis):
     points = 50.0 * np.random.default_rng(3).normal(size=(200, 3))
     expected = np.clip(points, 0.0, 1.0)
     expected[:, axis] = 0.0
-    found, _ = TriangleTree(triangles).nearest(points)
+    found, _ = nearest(surface_of(triangles), points)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
-    assert TriangleTree(triangles).nearest(np.empty((0, 3)))[0].shape == (0, 3)
+    assert nearest(surface_of(triangles), np.empty((0, 3)))[0].shape == (0, 3)
 
 
 @pytest.mark.parametrize("binary", [False, True])

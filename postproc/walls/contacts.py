@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dumps import DumpError
 from ..dumps.frames import folded
-from ..dumptext import DumpError
 from ..fields.coarse_graining import WallContacts
 from ..grains import GrainFrame
 from .surfaces import Wall

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dembark.common.errors import DembarkError
 
 from ..contacts import ContactFrame
-from ..dumptext import DumpError
+from ..dumps import DumpError
 from ..fields.coarse_graining import rows_of
 from ..grains import GrainFrame
 from .surfaces import CylinderWall, Places

@@ -1,4 +1,4 @@
-"""Triangle meshes as walls: STL files, and the nearest point of a mesh for many points at once."""
+"""Triangle meshes as walls: STL files, the nearest points of a mesh, and its cut by a plane."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pyvista
 from numpy.typing import NDArray
 
 from dembark import _dumps
 
-from ..dumptext import DumpError
+from ..dumps import DumpError
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -55,33 +56,15 @@ def cut(triangles: Array, place: float = 0.0) -> Array:
     return np.array(found, float).reshape(-1, 2, 2)
 
 
-class TriangleTree:
-    """Finds the nearest point of t triangles (t, 3, 3), by VTK's cell locator."""
+def surface_of(triangles: Array) -> pyvista.PolyData:
+    """`triangles` (t, 3, 3) as cells, each with corners of its own."""
+    corners = np.ascontiguousarray(triangles.reshape(-1, 3), float)
+    return pyvista.PolyData.from_regular_faces(corners, np.arange(len(corners)).reshape(-1, 3))
 
-    def __init__(self, triangles: Array) -> None:
-        # Slow to import, and only meshes need it.
-        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-        from vtkmodules.vtkCommonCore import vtkPoints
-        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData, vtkStaticCellLocator
 
-        corners, cells, mesh = vtkPoints(), vtkCellArray(), vtkPolyData()
-        corners.SetData(numpy_to_vtk(np.ascontiguousarray(triangles.reshape(-1, 3), float), deep=True))
-        count = 3 * len(triangles)
-        cells.SetData(numpy_to_vtkIdTypeArray(np.arange(0, count + 1, 3), deep=True), numpy_to_vtkIdTypeArray(np.arange(count), deep=True))
-        mesh.SetPoints(corners)
-        mesh.SetPolys(cells)
-        self._locator = vtkStaticCellLocator()
-        self._locator.SetDataSet(mesh)
-        self._locator.BuildLocator()
-
-    def nearest(self, points: Array) -> tuple[Array, Integers]:
-        """Nearest points (k, 3) of the mesh and their triangles (k,) for `points` (k, 3); of equally near triangles any one."""
-        from vtkmodules.vtkCommonCore import reference
-        from vtkmodules.vtkCommonDataModel import vtkGenericCell
-
-        found, which = np.empty((len(points), 3)), np.empty(len(points), np.int64)
-        cell, triangle, part, distance, place = vtkGenericCell(), reference(0), reference(0), reference(0.0), [0.0, 0.0, 0.0]
-        for number, point in enumerate(points.tolist()):
-            self._locator.FindClosestPoint(point, place, cell, triangle, part, distance)
-            found[number], which[number] = place, triangle
-        return found, which
+def nearest(surface: pyvista.PolyData, points: Array) -> tuple[Array, Integers]:
+    """Nearest points (k, 3) of the surface and their triangles (k,) for `points` (k, 3); of equally near triangles any one."""
+    if not len(points):
+        return np.empty((0, 3)), np.empty(0, np.int64)
+    which, found = surface.find_closest_cell(points, return_closest_point=True)
+    return np.asarray(found, float).reshape(-1, 3), np.atleast_1d(np.asarray(which, np.int64))

@@ -11,7 +11,7 @@ from dembark.common.errors import DembarkError
 
 from ..cli_options import STL_UNITS, PatchedWall, parse_wall, patched
 from ..contacts import ContactFrame
-from ..dumptext import DumpError
+from ..dumps import DumpError
 from ..grains import GrainFrame
 from ..history import read_times
 from ..sources import Selection, Source

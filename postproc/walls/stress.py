@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dembark.common.errors import DembarkError
 
 from ..contacts import ContactFrame
-from ..dumptext import DumpError
+from ..dumps import DumpError
 from ..grains import GrainFrame
 from . import Inclusion, Places, Wall, into_box, touching
 from .patches import Patches

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+import pyvista
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 
-from .mesh import PRECISION, TriangleTree, read_stl
+from .mesh import PRECISION, nearest, read_stl, surface_of
 
 Array = NDArray[np.float64]
 Vector = Sequence[float] | Array
@@ -211,20 +212,20 @@ class MeshWall:
         return np.stack([normal, along, np.cross(along, normal)], axis=1)
 
     @cached_property
-    def _tree(self) -> TriangleTree:
-        return TriangleTree(self.triangles)
+    def _surface(self) -> pyvista.PolyData:
+        return surface_of(self.triangles)
 
     def at(self, time: float) -> MeshWall:
         """The wall at `time` (s)."""
         moved = replace(self, motion=_REST, displacement=tuple(self.motion.shift(time)))
-        # The search tree of the mesh as it was given serves all times.
-        moved.__dict__.update(axes=self.axes, _tree=self._tree)
+        # The surface as it was given serves all times.
+        moved.__dict__.update(axes=self.axes, _surface=self._surface)
         return moved
 
     def places(self, centres: Array) -> Places:
         """Nearest points of the mesh."""
         shift = np.asarray(self.displacement, float)
-        points, triangle = self._tree.nearest(centres - shift)
+        points, triangle = nearest(self._surface, centres - shift)
         points = points + shift
         basis = self.axes[triangle]
         side = np.where(np.einsum("ka,ka->k", centres - points, basis[:, 0]) < 0.0, -1.0, 1.0)
