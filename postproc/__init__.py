@@ -4,24 +4,11 @@
 hold the fields.
 """
 
-from typing import TYPE_CHECKING, Any
-
 from .contacts import ContactFrame, ContactsDump
 from .dumps import DumpError, DumpWarning, TextDump, open_dump
 from .grains import GrainFrame, GrainsDump
 from .history import read_times
-
-if TYPE_CHECKING:
-    from .trajectory import universe
+from .trajectory import universe
 
 __all__ = ["ContactFrame", "ContactsDump", "DumpError", "DumpWarning", "GrainFrame", "GrainsDump", "TextDump", "open_dump", "read_times",
            "universe"]
-
-
-def __getattr__(name: str) -> Any:
-    """`universe`, when it is asked for: MDAnalysis takes longer to import than all else together, and few need it."""
-    if name == "universe":
-        from .trajectory import universe
-
-        return universe
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -14,7 +14,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .labelled import FILE
+from .measurement import FIELDS_FILE as FILE
 
 Array = NDArray[np.float64]
 

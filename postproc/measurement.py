@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["CONFIDENCE", "Array", "Curve", "Estimate", "Measurement", "Numbers", "Points", "Replica", "Replicas", "Value", "block_mean",
            "exact", "number", "over_replicas", "pooled", "profile"]
 
+# The fields of a series next to its metrics.json.
+FIELDS_FILE = "fields.nc"
 # Parameters of a run by name, in SI units.
 Numbers = Mapping[str, Any]
 # What `profile` returns.

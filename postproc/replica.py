@@ -120,7 +120,7 @@ class Replica:
             yield one, other
 
 
-def once(read: Callable[[Source], Measured]) -> Callable[[Source], Measured]:
+def cached_per_replica(read: Callable[[Source], Measured]) -> Callable[[Source], Measured]:
     """`read(replica)`, done once for each Replica object, or for what was read of it: quantities of a case and its fields share that."""
 
     @wraps(read)

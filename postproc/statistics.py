@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 Array = NDArray[np.float64]
 
@@ -47,16 +48,11 @@ def exact(value: float, half: float = 0.0) -> Estimate:
 
 def student(degrees: float, confidence: float = CONFIDENCE) -> float:
     """Two-sided quantile of Student's t distribution."""
-    # Scipy takes a third of a second to import; no engine has to wait for it.
-    from scipy import special
-
     return float(special.stdtrit(degrees, 0.5 + 0.5 * confidence)) if degrees >= 1 else math.inf
 
 
-def beyond(limit: float, half: float, degrees: float) -> float:
+def tail_probability(limit: float, half: float, degrees: float) -> float:
     """Probability that a value with the 95 % half-width `half` lies farther from its mean than `limit`; infinite `degrees`: normal."""
-    from scipy import special
-
     reach = student(degrees) * limit / half
     return 2.0 * float(special.stdtr(degrees, -reach) if math.isfinite(degrees) else special.ndtr(-reach))
 
@@ -147,8 +143,7 @@ def block_mean(series: Array, confidence: float = CONFIDENCE) -> Estimate:
     if len(values) < 2 * _MIN_BLOCKS:
         return Estimate(value, math.inf, f"{len(values)} samples are too few")
     blocks = time_blocks(values, most=_MOST_BLOCKS)
-    means = np.bincount(blocks.groups, values) / np.bincount(blocks.groups)
-    half = student(blocks.count - 1, confidence) * blocks.widening * float(means.std(ddof=1)) / math.sqrt(blocks.count)
+    half = float(block_halves(values[:, None], confidence)[0])
     return Estimate(value, half, ONE_SAMPLE if blocks.single else f"{blocks.count} block averages")
 
 

@@ -10,8 +10,9 @@ from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json
-from dembark.postproc import labelled
+from dembark.postproc.measurement import FIELDS_FILE
 from dembark.postproc.measurement import Measurement
+from dembark.postproc.output import write_netcdf
 from dembark.postproc.replica import Replica
 from dembark.validation import analysis, engines, provenance
 from dembark.validation.case import deck
@@ -66,8 +67,11 @@ def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str
     with analysis.warnings_kept() as warnings:
         found = measurement.measure(case, runs)
         if found.fields is not None:
-            fields = labelled.FILE
-            labelled.write(folder / fields, found.fields)
+            # Of the extra `fields`, which cases without fields do without.
+            from dembark.postproc.output.netcdf import write_netcdf
+
+            fields = FIELDS_FILE
+            write_netcdf(folder / fields, found.fields)
     noted = replace(found, remarks=[*found.remarks, *dict.fromkeys(warnings)], fields=None)
     return measurement_file.write(folder, measurement_file.Measured(inputs_hash, noted, provenance.measured(), fields))
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dembark.postproc import DumpError
 from dembark.postproc.dumps import TextDump
 from dembark.postproc.measurement import Value, number, profile
-from dembark.postproc.replica import Array, Replica, once
+from dembark.postproc.replica import Array, Replica, cached_per_replica
 
 # Points of a curve, twice as many at most.
 POINTS = 100
@@ -90,7 +90,7 @@ def read_touches(path: Path) -> list[TouchFrame]:
     return frames
 
 
-@once
+@cached_per_replica
 def read(replica: Replica) -> LogRun:
     """The whole run as arrays; DumpError when files do not fit together."""
     frames, history = list(replica.grains()), replica.times()

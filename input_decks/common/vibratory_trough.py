@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replica, Value, block_mean, exact, profile
-from dembark.postproc.replica import once
+from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.statistics import combined, jackknife
 from dembark.postproc.studies import measured
 
@@ -170,7 +170,7 @@ def spectrum(forces: Array, periods: int) -> tuple[Array, Array]:
     return np.arange(len(amplitudes)) / periods, sides * (np.abs(amplitudes) ** 2).sum(axis=1) / count**2
 
 
-@once
+@cached_per_replica
 def read(replica: Replica) -> Trough:
     """What was written; the free part, where there is one, is the last body."""
     given, derived = replica.parameters, replica.derived

@@ -12,7 +12,7 @@ from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Numbers, Points, Replica, Replicas, Value, exact, profile
-from dembark.postproc.replica import once
+from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.statistics import student
 from dembark.postproc.studies import compared, measured, numerical
 
@@ -31,7 +31,7 @@ def published(source: str) -> tuple[Array, Array]:
     return times, fronts
 
 
-@once
+@cached_per_replica
 def front(run: Replica) -> tuple[Array, Array]:
     """Times T = t √(2g/a) and places over a of the front: the foremost particle and half a spacing."""
     p = run.parameters

@@ -13,7 +13,7 @@ from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.convergence import convergence
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
-from dembark.postproc.replica import once
+from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.statistics import replica_mean
 from dembark.postproc.studies import measured
 
@@ -61,7 +61,7 @@ def outside(places: Array, velocities: Array, p: Mapping[str, Any], thick: float
     return np.asarray((out | (z < -0.5 * dx)) & ~over), np.asarray(over)
 
 
-@once
+@cached_per_replica
 def water(run: Replica) -> dict[str, float]:
     """What the frames of the fluid show."""
     p, times, dx = run.parameters, run.times(), run.parameters["spacing"]
@@ -112,7 +112,7 @@ def wetted(places: Array, width: float, dx: float) -> float:
     return float(grid.mean())
 
 
-@once
+@cached_per_replica
 def moved(run: Replica) -> dict[str, float]:
     """What the history shows of the cubes and of energies; nan for what the run does not reach."""
     p, rows = run.parameters, run.times()

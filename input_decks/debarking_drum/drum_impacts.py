@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark.postproc import DumpError
-from dembark.postproc.labelled import labelled, variable, with_interval
 from dembark.postproc.measurement import Array, Curve, Estimate, Replica, over_replicas, profile
-from dembark.postproc.replica import once
+from dembark.postproc.output import cf_dataset, variable, with_interval
+from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import TimeBlocks, time_blocks
 
@@ -102,7 +102,7 @@ class Drum:
         return np.bincount(self.quarter[impacts], self.loss[impacts], self.quarters).astype(float, copy=False)
 
 
-@once
+@cached_per_replica
 def read(replica: Replica) -> Drum:
     """The window of `replica`; DumpError when its files do not belong together."""
     given, derived, times, impacts = replica.parameters, replica.derived, replica.times(), replica.impacts()
@@ -224,7 +224,7 @@ def fields(replicas: Sequence[Replica]) -> xarray.Dataset:
     coordinates = {"x": variable(["x"], middle, "m", "across the drum"), "z": variable(["z"], middle, "m", "upward"),
                    "angle": variable(["angle"], PLACES, "degree", "angle from the lowest point in the direction of rotation"),
                    "force": variable(["force"], force, "N", "peak force, middle of the bin on a logarithmic scale")}
-    return labelled(variables, coordinates, drum_radius=radius, drum_speed=float(given["drum_speed"]),
+    return cf_dataset(variables, coordinates, drum_radius=radius, drum_speed=float(given["drum_speed"]),
                     log_length=float(given["log_length"]), impact_speed=float(given["impact_speed"]), revolutions=drums[0].revolutions,
                     replicas=len(drums), impacts=sum(len(one.peak) for one in drums))
 

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from dembark.common.errors import RunError
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.fields.coarse_graining import WallContacts, rows_of
-from dembark.postproc.replica import Array, Replica, once
+from dembark.postproc.replica import Array, Replica, cached_per_replica
 from dembark.postproc.resampling import profile, resampled
 from dembark.postproc.spheres import slice_volumes, volume
 from dembark.postproc.statistics import Estimate, block_mean, steady_start, time_blocks
@@ -207,7 +207,7 @@ def joined(given: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], track: A
         **over_frames, **more)
 
 
-@once
+@cached_per_replica
 def read(replica: Replica) -> Channel:
     """Measure a run whose grains sink with a plate, in cells that rest in the laboratory and stay filled for all frames used; the scale of
     velocities is the plate's. RunError when they stay filled over less than four diameters."""
@@ -236,7 +236,7 @@ def read(replica: Replica) -> Channel:
                   steady_share=float(used.mean()), remark=remark)
 
 
-@once
+@cached_per_replica
 def read_periodic(replica: Replica) -> Channel:
     """Measure a run whose grains fall between the walls, periodic along the flow; the scale of velocities is sqrt(g W). The walls' friction
     swings by as much as its mean, so the steady part is that of the kinetic energy, which sums up what the balance of forces lacks. The

@@ -18,8 +18,8 @@ from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.field_set import FieldSet
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import CUTOFF
-from dembark.postproc.labelled import labelled, variable, with_interval
 from dembark.postproc.measurement import Array, Measurement, Replica, Value
+from dembark.postproc.output import cf_dataset, variable, with_interval
 from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, over_replicas, student, time_blocks
 from dembark.postproc.walls import PlaneWall, wall_contacts
@@ -190,6 +190,6 @@ def _dataset(flows: Sequence[Flow]) -> Any:
                                                 "the same from displacements of single grains, smoothed with the same kernel")
     coordinates = {"x": variable(["x"], first.across, "m", "distance from the left wall"),
                    "z": variable(["z"], heights, "m", "height in the window, at rest in the laboratory frame")}
-    return labelled(variables, coordinates, kernel="gaussian", width=WIDTH * channel.diameter, channel_width=channel.width,
+    return cf_dataset(variables, coordinates, kernel="gaussian", width=WIDTH * channel.diameter, channel_width=channel.width,
                     averaged="along y and over the frames of the steady part", frames=sum(len(one.channel.solid) for one in flows),
                     replicas=len(flows), grain_diameter=channel.diameter, base_speed=channel.speed)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from dembark.postproc.measurement import Estimate
-from dembark.postproc.replica import Array, Replica, once
+from dembark.postproc.replica import Array, Replica, cached_per_replica
 from dembark.postproc.resampling import resampled
 from dembark.postproc.spheres import slice_volumes, volume
 from dembark.postproc.statistics import block_mean, time_blocks
@@ -143,7 +143,7 @@ def surface_line(plane: Array, cell: float, radius: float, diameter: float) -> f
     return angle
 
 
-@once
+@cached_per_replica
 def read(replica: Replica) -> DrumFlow:
     """Measure a run; glued grains do not count."""
     given = replica.parameters

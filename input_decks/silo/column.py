@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dembark.physics import capillary_force
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.measurement import Array, Estimate, Replica, block_mean
-from dembark.postproc.replica import once
+from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.spheres import slice_volumes
 
 from . import janssen
@@ -197,7 +197,7 @@ class Column:
         return (self.field[:, chosen].sum(axis=1) - total) / total.mean()
 
 
-@once
+@cached_per_replica
 def read(replica: Replica) -> Column:
     """Measure one run folder."""
     values = replica.parameters

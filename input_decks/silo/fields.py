@@ -13,9 +13,9 @@ import numpy as np
 
 from dembark.postproc import ContactFrame, GrainFrame
 from dembark.postproc.fields.rings import Fields, Rings, Zones, coarse_grain
-from dembark.postproc.labelled import labelled, variable, with_interval
 from dembark.postproc.measurement import Array, Measurement, Replica, Value
-from dembark.postproc.replica import once
+from dembark.postproc.output import cf_dataset, variable, with_interval
+from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, over_replicas, time_blocks
 from dembark.postproc.walls import CylinderWall, PlaneWall, wall_contacts
@@ -75,7 +75,7 @@ class Silo:
         return resampled(ratio, self.blocks, sectors, overlap(len(sectors)))
 
 
-@once
+@cached_per_replica
 def read(replica: Replica) -> Silo:
     """Measure one run folder; zones are shares of its own filling height."""
     given, height = replica.parameters, column.read(replica).height
@@ -190,6 +190,6 @@ def _dataset(silos: Sequence[Silo], law: Array, height: float, diameter: float, 
     }
     coordinates = {"radius": variable(["radius"], cells.radii, "m", "distance from the axis"),
                    "height": variable(high, cells.heights, "m", "height above the base")}
-    return labelled(variables, coordinates, kernel="gaussian", width=cells.width, averaged="around the axis and over frames",
-                    frames=fields.frames, replicas=len(silos), vessel_radius=cells.radius, filling_height=height,
+    return cf_dataset(variables, coordinates, kernel="gaussian", width=cells.width, averaged="around the axis and over frames",
+                      frames=fields.frames, replicas=len(silos), vessel_radius=cells.radius, filling_height=height,
                     grain_diameter=diameter)

@@ -10,7 +10,7 @@ import numpy as np
 
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.measurement import Array, Measurement, Value
-from dembark.postproc.replica import once
+from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.resampling import pooled, profile, resampled
 from dembark.postproc.statistics import Estimate, block_mean, exact, time_blocks
 from dembark.postproc.studies import measured as of_point
@@ -40,7 +40,7 @@ def _kept(fit: Fit) -> Fit:
     return get
 
 
-@once
+@cached_per_replica
 def scalars(one: Column) -> dict[str, Estimate]:
     """Quantities of one replica by name, lengths over the vessel's size; names with _ are what references and intervals are made of."""
     frames, (_, whole), size = time_blocks(one.shear.sum(axis=(1, 2))), one.everything, one.vessel.size

@@ -13,7 +13,7 @@ from dembark.input_decks.common.drive_phases import read_phases
 from dembark.input_decks.common.vibration import PHASES
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Array, Estimate, Replica, block_mean
-from dembark.postproc.replica import once
+from dembark.postproc.replica import cached_per_replica
 
 from .standing_waves import Waves, amplitude, onset, order_onset, surface_levels
 
@@ -59,7 +59,7 @@ def wave_amplitude(waves: Waves) -> Estimate:
     return Estimate(size, 2.0 * power.half / size if size > 0.0 else math.inf, power.basis)
 
 
-@once
+@cached_per_replica
 def read(replica: Replica) -> Layer:
     """What was written; DumpError when frames of a level are missing."""
     p, derived = replica.parameters, replica.derived

@@ -13,7 +13,7 @@ from dembark.input_decks.common.motion import motion
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.common.trough import polygon
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas
-from dembark.postproc.replica import once
+from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.studies import measured
 
 from .part_impacts import ContactRecord, histogram, read_record
@@ -21,7 +21,7 @@ from .part_impacts import ContactRecord, histogram, read_record
 WALLS = ("trough", "part")
 
 
-@once
+@cached_per_replica
 def contact_record(replica: Replica) -> ContactRecord:
     """The record of the grains on the part."""
     p, derived = replica.parameters, replica.derived

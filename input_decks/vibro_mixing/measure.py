@@ -8,7 +8,7 @@ from dembark.input_decks.common.drive_phases import Phases, read_phases
 from dembark.input_decks.common.estimates import over_chaotic
 from dembark.input_decks.common.momentum import unexplained
 from dembark.postproc.measurement import Curve, Measurement, Numbers, Replicas, Value, exact, over_replicas, profile
-from dembark.postproc.replica import Array, Replica, once
+from dembark.postproc.replica import Array, Replica, cached_per_replica
 
 from .mixing import SAMPLE, Kinds, cells, lacey_index, lower_half, mixing_rate, rate, samples, segregation, wall_drift
 
@@ -16,7 +16,7 @@ from .mixing import SAMPLE, Kinds, cells, lacey_index, lower_half, mixing_rate, 
 LABELLINGS, PHASE = 16, 0
 
 
-@once
+@cached_per_replica
 def read(replica: Replica) -> Phases:
     """The frames by their phase."""
     return read_phases((frame.select(frame.types == 1) for frame in replica.grains()), replica.derived["period_steps"], replica.time_step)

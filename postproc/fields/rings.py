@@ -20,16 +20,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.sparse import csr_array
+from scipy.special import ive, ndtr
 
 from .. import ContactFrame, GrainFrame, spheres
 from .coarse_graining import WallContacts
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 
@@ -104,8 +104,6 @@ class Rings:
         return np.linspace(low, high, 4 + int(np.ceil(_TABLE * (high - low) / self.width)))
 
     def _kernel(self, order: int, radius: Array, source: Array) -> Array:
-        from scipy.special import ive
-
         scaled = ive(order, radius * source / self.width**2) * np.exp(-0.5 * ((radius - source) / self.width) ** 2)
         return np.asarray(scaled / (2.0 * np.pi * self.width**2))
 
@@ -130,8 +128,6 @@ class Rings:
 
     def along(self, source: Array) -> tuple[Array, Array]:
         """For sources at the heights (m,): shares (m, l) in the layers, and values (m, l + 1) at their borders in 1/m."""
-        from scipy.special import ndtr
-
         distance = (self.vertical - source[:, None]) / self.width
         below, density = ndtr(distance), np.exp(-0.5 * distance**2) / (np.sqrt(2.0 * np.pi) * self.width)
         # The outermost layers hold what lies beyond them, so nothing flows through their outer borders.
@@ -142,8 +138,6 @@ class Rings:
     @cached_property
     def above(self) -> Array:
         """Part (l,) of the kernel that lies above the base: 1 far from it, ½ at it."""
-        from scipy.special import ndtr
-
         return np.asarray(ndtr(self.heights / self.width))
 
     @cached_property
@@ -161,16 +155,11 @@ class _Table:
     stay what they are at the first and the last."""
 
     def __init__(self, places: Array, values: Array) -> None:
-        from scipy.interpolate import make_interp_spline  # slow to import, and not needed before something is measured
-
         spline = make_interp_spline(places, values)
         self._knots, self.coefficients = spline.t, spline.c
 
     def basis(self, place: Array) -> csr_array:
         """Values of the B-splines at the places (m,), (m, n), four in each row."""
-        from scipy.interpolate import BSpline
-        from scipy.sparse import csr_array
-
         if not len(place):
             return csr_array((0, len(self.coefficients)))
         return BSpline.design_matrix(np.clip(place, self._knots[0], self._knots[-1]), self._knots, 3)
@@ -289,8 +278,6 @@ class _Sources:
 
     def summed(self, values: Array) -> Array:
         """Sums (q, nr, nz) of `values` (m, q) over the nodes of both tables."""
-        from scipy.sparse import csr_array
-
         (count, nr), nz = self._across.shape, self._along.shape[1]
         share = self._across.data.reshape(count, 4, 1) * self._along.data.reshape(count, 1, 4)
         node = nz * self._across.indices.reshape(count, 4, 1) + self._along.indices.reshape(count, 1, 4)

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import h5netcdf
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import write_whole
@@ -29,6 +31,24 @@ _DIMENSIONS = ("time", "x", "y", "z", "i", "j")
 _TIME = {"units": "s", "long_name": "simulated time, middle of the averaged span", "axis": "T", "standard_name": "time",
          "bounds": "time_bounds"}
 _STEPS = {"units": "1", "long_name": "number of the time step, for the time is not known", "axis": "T"}
+
+
+def variable(dimensions: Sequence[str], values: Any, units: str, name: str) -> tuple[tuple[str, ...], NDArray[Any], dict[str, str]]:
+    """A variable of a Dataset with the attributes of the CF conventions: `units` and its long `name`."""
+    return tuple(dimensions), np.asarray(values), {"units": units, "long_name": name}
+
+
+def with_interval(key: str, dimensions: Sequence[str], estimates: Sequence[Any], units: str, name: str) -> dict[str, Any]:
+    """The variable `key` from (nested sequences of) estimates, and `<key>_half`, the half-width of its 95 % interval."""
+    table = np.array(estimates, object)
+    values, halves = (np.vectorize(attrgetter(part), otypes=[float])(table) for part in ("value", "half"))
+    return {key: variable(dimensions, values, units, name),
+            f"{key}_half": variable(dimensions, halves, units, "half-width of its 95 % interval")}
+
+
+def cf_dataset(variables: Mapping[str, Any], coordinates: Mapping[str, Any], **attributes: str | float) -> xarray.Dataset:
+    """A Dataset by the CF conventions."""
+    return xarray.Dataset(dict(variables), dict(coordinates), {"Conventions": "CF-1.11", **attributes})
 
 
 def dataset(fields: FieldSet, time: float = 0.0, span: tuple[float, float] | None = None, attributes: Attributes | None = None, *,
@@ -50,7 +70,7 @@ def dataset(fields: FieldSet, time: float = 0.0, span: tuple[float, float] | Non
     for name, values in fields.arrays().items():
         about = {"units": fields.units[name], "long_name": fields.long_names[name], "cell_methods": "time: mean"}
         variables[name] = (_DIMENSIONS[: values.ndim + 1], values[None], about)
-    return xarray.Dataset(variables, coordinates, {"Conventions": "CF-1.11", **(attributes or {})})
+    return cf_dataset(variables, coordinates, **(attributes or {}))
 
 
 def joined(datasets: Sequence[xarray.Dataset]) -> xarray.Dataset:
@@ -103,7 +123,7 @@ def wall_dataset(stress: WallStress, *, timed: bool = True) -> xarray.Dataset:
     variables: dict[str, Any] = {}
 
     def put(name: str, dimensions: tuple[str, ...], values: Any, units: str, text: str) -> None:
-        variables[name] = (dimensions, values, {"units": units, "long_name": text})
+        variables[name] = variable(dimensions, values, units, text)
 
     on = stress.on_grid
     put("stress", (*names, "component"), on(stress.mean), "Pa", "mean stress of the wall on the grains")

@@ -1,4 +1,4 @@
-"""Logs and layers of grains in cross-section: the last frame as a figure, and frames as an animation beside the report."""
+"""Logs and layers of grains in cross-section: the last frame as a figure, and frames as an animation."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image
 
 from dembark.common.files import read_json
 
@@ -28,7 +29,7 @@ from . import saved
 from .packings import HEIGHT
 
 _MAP = "cividis"
-_OVERSAMPLING = 3
+_DOTS = 100  # an inch of an animation
 _SHELL = "#4a4f57"
 _CHAIN = "#d55e00"
 Array = NDArray[np.float64]
@@ -135,28 +136,23 @@ def picture(section: Section) -> bytes:
         figure = Figure(figsize=(HEIGHT + 1.1, HEIGHT), layout="constrained")
         axes = figure.subplots()
         draw(axes, section, top)
+        _last(axes, section)
         bar = figure.colorbar(ScalarMappable(Normalize(0.0, top), _MAP), ax=axes, shrink=0.75, aspect=22, pad=0.02, extend="max")
         bar.set_label(section.label)
         bar.outline.set_linewidth(0.4)
     return saved(figure)
 
 
-def draw(axes: Axes, section: Section, top: float) -> None:
-    """The last frame in `axes`, speeds up to `top` on the colour scale."""
+def draw(axes: Axes, section: Section, top: float, frame: int = -1) -> None:
+    """A frame in `axes`, the last one by default, speeds up to `top` on the colour scale."""
     if section.drum_radius > 0.0:
         axes.add_patch(Circle((0.0, 0.0), section.drum_radius, fill=False, edgecolor=_SHELL, linewidth=1.6))
-        _arrow(axes, section)
     if len(section.walls):
-        axes.add_collection(LineCollection(list(section.walls[-1]), colors=_SHELL, linewidths=1.2))
+        axes.add_collection(LineCollection(list(section.walls[frame]), colors=_SHELL, linewidths=1.2))
     size = 2.0 * section.radii
     axes.add_collection(EllipseCollection(
-        size, size, np.zeros_like(size), units="x", offsets=section.places[-1], offset_transform=axes.transData, array=section.speeds[-1],
-        cmap=_MAP, norm=Normalize(0.0, top), edgecolor="white", linewidth=0.3))
-    if len(section.forces):
-        widths = 4.0 * np.sqrt(section.forces / section.forces.max())
-        axes.add_collection(LineCollection(list(section.links), linewidths=widths, colors=_CHAIN, alpha=0.85, capstyle="round"))
-    left, right, bottom, upper = section.last_view
-    axes.set(xlim=(left, right), ylim=(bottom, upper), aspect="equal")
+        size, size, np.zeros_like(size), units="x", offsets=section.places[frame], offset_transform=axes.transData,
+        array=section.speeds[frame], cmap=_MAP, norm=Normalize(0.0, top), edgecolor="white", linewidth=0.3))
     axes.axis("off")
 
 
@@ -165,44 +161,35 @@ def limit(section: Section) -> float:
     return float(np.percentile(section.speeds, 98.0)) or 1.0
 
 
-def _arrow(axes: Axes, section: Section) -> None:
-    if section.drum_speed == 0.0:
-        return
-    radius, turn = 0.93 * section.drum_radius, math.copysign(1.0, section.drum_speed)
-    ends = [(radius * math.cos(angle), radius * math.sin(angle)) for angle in (math.pi / 2 + 0.28 * turn, math.pi / 2 - 0.28 * turn)]
-    axes.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": _SHELL,
-                                                    "connectionstyle": f"arc3,rad={-0.28 * turn}", "linewidth": 1.0})
+def _last(axes: Axes, section: Section) -> None:
+    """The view of the last frame, with the contact forces in it and an arrow along which the drum turns."""
+    if len(section.forces):
+        widths = 4.0 * np.sqrt(section.forces / section.forces.max())
+        axes.add_collection(LineCollection(list(section.links), linewidths=widths, colors=_CHAIN, alpha=0.85, capstyle="round"))
+    if section.drum_radius > 0.0 and section.drum_speed != 0.0:
+        radius, turn = 0.93 * section.drum_radius, math.copysign(1.0, section.drum_speed)
+        ends = [(radius * math.cos(angle), radius * math.sin(angle)) for angle in (math.pi / 2 + 0.28 * turn, math.pi / 2 - 0.28 * turn)]
+        axes.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": _SHELL,
+                                                        "connectionstyle": f"arc3,rad={-0.28 * turn}", "linewidth": 1.0})
+    left, right, bottom, upper = section.last_view
+    axes.set(xlim=(left, right), ylim=(bottom, upper), aspect="equal")
 
 
 def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
     """All frames as a GIF at `path`, each for `duration` ms; marks on the shell turn with the drum. Returns `path`."""
     left, right, bottom, upper = section.view
-    scale = _OVERSAMPLING * section.pixels / max(right - left, upper - bottom)
-    width, height = round((right - left) * scale), round((upper - bottom) * scale)
-    colours = matplotlib.colormaps[_MAP](np.minimum(section.speeds / limit(section), 1.0), bytes=True)[..., :3]
-
-    def at(place: Array) -> tuple[float, float]:
-        return (place[0] - left) * scale, (upper - place[1]) * scale
-
-    images = []
-    for number, (places, paint, time) in enumerate(zip(section.places, colours.tolist(), section.times, strict=True)):
-        image = Image.new("RGB", (width, height), "white")
-        draw = ImageDraw.Draw(image)
+    scale, top, images = section.pixels / max(right - left, upper - bottom) / _DOTS, limit(section), []
+    for number, time in enumerate(section.times):
+        figure = Figure(figsize=((right - left) * scale, (upper - bottom) * scale), dpi=_DOTS)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        draw(axes, section, top, number)
         if section.drum_radius > 0.0:
-            radius, middle = section.drum_radius * scale, at(np.zeros(2))
-            draw.ellipse([middle[0] - radius, middle[1] - radius, middle[0] + radius, middle[1] + radius], outline=_SHELL,
-                         width=2 * _OVERSAMPLING)
-            for mark in range(12):
-                angle = 2.0 * math.pi * mark / 12.0 - section.drum_speed * time
-                way = np.array([math.cos(angle), math.sin(angle)])
-                draw.line([at(section.drum_radius * way), at(1.035 * section.drum_radius * way)], fill=_SHELL, width=2 * _OVERSAMPLING)
-        for start, end in section.walls[number] if len(section.walls) else ():
-            draw.line([at(start), at(end)], fill=_SHELL, width=_OVERSAMPLING)
-        size = section.radii * scale
-        x, y = (places[:, 0] - left) * scale, (upper - places[:, 1]) * scale
-        for box, colour in zip(np.column_stack([x - size, y - size, x + size, y + size]).tolist(), paint, strict=True):
-            draw.ellipse(box, fill=tuple(colour), outline="white", width=max(1, _OVERSAMPLING // 2))
-        # The mean of the oversampled pixels, which costs a twentieth of a filter that reaches further.
-        images.append(image.reduce(_OVERSAMPLING).quantize(32))
+            angles = np.arange(12) * np.pi / 6.0 - section.drum_speed * time
+            marks = section.drum_radius * np.column_stack([np.cos(angles), np.sin(angles)])
+            axes.add_collection(LineCollection(list(np.stack([marks, 1.035 * marks], axis=1)), colors=_SHELL, linewidths=1.2))
+        axes.set(xlim=(left, right), ylim=(bottom, upper))
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy()).quantize(32))
     images[0].save(path, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
     return path

@@ -3,13 +3,13 @@
 import pytest
 
 from dembark.postproc import DumpError
-from dembark.postproc.replica import Replica, once
+from dembark.postproc.replica import Replica, cached_per_replica
 
 
 def test_what_was_read_is_kept_with_the_replica(tmp_path):
     calls = []
 
-    @once
+    @cached_per_replica
     def read(replica):
         calls.append(replica)
         return len(calls)

@@ -9,7 +9,6 @@ from scipy.signal import lfilter
 from dembark.postproc.resampling import resampled
 from dembark.postproc.statistics import (
     Estimate,
-    beyond,
     block_halves,
     block_mean,
     correlation_time,
@@ -19,6 +18,7 @@ from dembark.postproc.statistics import (
     replica_mean,
     scatter,
     steady_start,
+    tail_probability,
     time_blocks,
 )
 
@@ -116,9 +116,9 @@ def test_joint_limit_is_exceeded_as_often_as_it_says(counts):
 
 
 def test_the_chance_of_a_value_beyond_a_limit_is_that_of_its_interval():
-    assert beyond(2.0, 2.0, 4.0) == pytest.approx(0.05) == beyond(0.3, 0.3, math.inf)
-    assert beyond(2.0, 1.0, math.inf) == pytest.approx(math.erfc(2.0 * 1.959964 / math.sqrt(2.0)), rel=1e-5)
-    assert beyond(2.0, 1.0, 2.0) > beyond(2.0, 1.0, 9.0) > beyond(2.0, 1.0, math.inf)
+    assert tail_probability(2.0, 2.0, 4.0) == pytest.approx(0.05) == tail_probability(0.3, 0.3, math.inf)
+    assert tail_probability(2.0, 1.0, math.inf) == pytest.approx(math.erfc(2.0 * 1.959964 / math.sqrt(2.0)), rel=1e-5)
+    assert tail_probability(2.0, 1.0, 2.0) > tail_probability(2.0, 1.0, 9.0) > tail_probability(2.0, 1.0, math.inf)
 
 
 @pytest.mark.parametrize("length", [50, 120])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from dembark.common.errors import DembarkError
 from dembark.postproc.measurement import Measurement, Value
-from dembark.postproc.statistics import Estimate, beyond
+from dembark.postproc.statistics import Estimate, tail_probability
 from dembark.validation.case.model import Case, Declared
 
 from .decision import decides, packings
@@ -125,7 +125,7 @@ def chance(half: float, tolerance: float | None, count: float) -> float | None:
         return None
     if not math.isfinite(half):
         return 0.0
-    return beyond(tolerance if half <= tolerance else tolerance + half, half, count - 1.0 if count >= 3 else math.inf)
+    return tail_probability(tolerance if half <= tolerance else tolerance + half, half, count - 1.0 if count >= 3 else math.inf)
 
 
 def _finite(value: float | None) -> float | None:

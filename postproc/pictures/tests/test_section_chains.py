@@ -34,7 +34,7 @@ def test_chains_join_logs_and_reach_to_walls(run: Path) -> None:
     np.testing.assert_allclose(found.links, [[[0.0, 0.1], [0.2, 0.1]], [[0.0, 0.1], [0.0, 0.0]]], atol=1e-12)
     assert not len(cross_section.scene(run, "xy", speed=1.0).forces)
     axes = Figure().subplots()
-    cross_section.draw(axes, found, 1.0)
+    cross_section._last(axes, found)
     lines = [one for one in axes.collections if type(one).__name__ == "LineCollection"]
     assert len(lines) == 1
     wide, narrow = lines[0].get_linewidths()

@@ -13,7 +13,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from dembark.postproc import pictures
-from dembark.postproc.labelled import FILE
+from dembark.postproc.measurement import FIELDS_FILE as FILE
 from dembark.postproc.measurement import Value
 from dembark.postproc.pictures import saved
 from dembark.postproc.statistics import Estimate
