@@ -168,7 +168,6 @@ class _WallOptions:
                      for axis, name in enumerate(usual.names)]
             if isinstance(wall, PlaneWall):
                 return plane_patches(wall, *edges)
-            assert isinstance(wall, CylinderWall)
             return cylinder_patches(wall, numbers.get("around", usual.shape[0]), edges[1])
 
         return PatchedWall(wall, patches, self.unit() if isinstance(wall, MeshWall) else 1.0)

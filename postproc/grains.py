@@ -60,8 +60,8 @@ class GrainFrame:
     """All n grains at one step, sorted by id; SI units.
 
     `time` (s) is what the dump says by `ITEM: TIME`, or None. `positions` (m) are unwrapped where the dump has image flags, `wrapped` are
-    those inside the box; `velocities` (m/s),
-    `omegas` (rad/s), `forces` (N, all contacts and gravity) are (n, 3); `radii` (m), `masses` (kg), `ids`, `types` are (n,);
+    those inside the box; `velocities` (m/s), `omegas` (rad/s), `forces` (N, all contacts and gravity)
+    are (n, 3); `radii` (m), `masses` (kg), `ids`, `types` are (n,);
     `wall_forces[name]` (n, 3) is the force of that wall on each grain (N). `low`, `high` (m) and `periodic` describe the box, which
     `tilt` = (xy, xz, yz) (m) shears: its edges are (Lx, 0, 0), (xy, Ly, 0), (xz, yz, Lz). `extra` holds every other column (n,) by
     its name in the dump. What the dump does not hold of velocities, omegas, forces and types is given as None, and asking for it
@@ -100,15 +100,10 @@ class GrainFrame:
 
     def select(self, mask: NDArray[np.bool_]) -> GrainFrame:
         """The same frame with only the grains where `mask` (n,) is true."""
-        def of(name: str) -> Any:
-            return self.__dict__[name][mask] if self.has(name) else None
-
-        return replace(
-            self, ids=self.ids[mask], positions=self.positions[mask], wrapped=self.wrapped[mask], radii=self.radii[mask],
-            masses=self.masses[mask], types=of("types"), velocities=of("velocities"), omegas=of("omegas"), forces=of("forces"),
-            wall_forces={name: force[mask] for name, force in self.wall_forces.items()},
-            extra={name: values[mask] for name, values in self.extra.items()},
-        )
+        names = ("ids", "positions", "wrapped", "radii", "masses", "types", "velocities", "omegas", "forces")
+        arrays: dict[str, Any] = {name: self.__dict__[name][mask] if self.has(name) else None for name in names}
+        return replace(self, **arrays, wall_forces={name: force[mask] for name, force in self.wall_forces.items()},
+                       extra={name: values[mask] for name, values in self.extra.items()})
 
 
 class _Table:

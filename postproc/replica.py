@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property, wraps
+from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,9 +19,6 @@ from . import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, rea
 Array = NDArray[np.float64]
 Source = TypeVar("Source")
 Measured = TypeVar("Measured")
-
-# Bytes of dumps that are kept as frames, for they are read several times.
-KEPT = 32 << 20
 
 
 @dataclass(frozen=True)
@@ -55,7 +52,7 @@ class Replica:
         return ContactsDump(self.folder / "contacts.dump")
 
     def times(self) -> dict[str, Array]:
-        """The whole run, a row an output interval."""
+        """The complete run, a row for each output interval."""
         return read_times(self.folder / "time.csv")
 
     def impacts(self) -> Array:
@@ -76,22 +73,18 @@ class Replica:
         return table
 
     def paired_frames(self) -> Iterator[tuple[GrainFrame, ContactFrame]]:
-        """(grains, contacts) of every frame, those of a small run from memory when they were read before; DumpError when the two files do
-        not hold the same steps."""
-        if "_frames" in self.__dict__:
-            yield from self.__dict__["_frames"]
-            return
-        kept = []
-        for pair in self._read_pairs():
-            if self._small:
-                kept.append(pair)
-            yield pair
-        if self._small:
-            self.__dict__["_frames"] = kept
+        """(grains, contacts) of every frame; DumpError when the two files do not hold the same steps."""
+        grains, contacts = self.grains(), self.contacts()
+        if len(grains) != len(contacts):
+            raise DumpError(f"{self.folder}: grains.dump has {len(grains)} frames, contacts.dump {len(contacts)}")
+        for one, other in zip(grains, contacts, strict=True):
+            if one.step != other.step:
+                raise DumpError(f"{self.folder}: step {one.step} of grains.dump has the place of step {other.step} of contacts.dump")
+            yield one, other
 
     def mapped(self, work: Callable[[GrainFrame, ContactFrame], Measured]) -> Iterator[tuple[GrainFrame, Measured]]:
         """Every frame in order with `work(grains, contacts)`, done in as many threads as there are cores: most of what is done with arrays
-        leaves the interpreter to others. Few frames are in memory at a time, unless the run is small."""
+        leaves the interpreter to others. Few frames are in memory at a time."""
         threads = len(os.sched_getaffinity(0))
         with ThreadPoolExecutor(threads) as pool:
             ahead = deque[tuple[GrainFrame, Future[Measured]]]()
@@ -101,23 +94,6 @@ class Replica:
                     first, done = ahead.popleft()
                     yield first, done.result()
             yield from ((first, done.result()) for first, done in ahead)
-
-    def grain_frames(self) -> Iterator[GrainFrame]:
-        """The grains of every frame; those of a small run are read with their contacts, and but once."""
-        return (grains for grains, _ in self.paired_frames()) if self._small else iter(self.grains())
-
-    @cached_property
-    def _small(self) -> bool:
-        return sum(path.stat().st_size for path in self.folder.glob("*.dump")) <= KEPT
-
-    def _read_pairs(self) -> Iterator[tuple[GrainFrame, ContactFrame]]:
-        grains, contacts = self.grains(), self.contacts()
-        if len(grains) != len(contacts):
-            raise DumpError(f"{self.folder}: grains.dump has {len(grains)} frames, contacts.dump {len(contacts)}")
-        for one, other in zip(grains, contacts, strict=True):
-            if one.step != other.step:
-                raise DumpError(f"{self.folder}: step {one.step} of grains.dump stands beside step {other.step} of contacts.dump")
-            yield one, other
 
 
 def cached_per_replica(read: Callable[[Source], Measured]) -> Callable[[Source], Measured]:

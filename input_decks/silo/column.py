@@ -203,7 +203,7 @@ def read(replica: Replica) -> Column:
     values = replica.parameters
     silo, diameter, gravity = container(values), float(values["grain_diameter"]), float(values["gravity"])
     outlines = [(frame.step, profiles.surface_height(frame.positions[:, 2], frame.radii, silo.area), frame.masses.sum())
-                for frame in replica.grain_frames()]
+                for frame in replica.grains()]
     height, mass = float(np.mean([row[1] for row in outlines])), float(outlines[-1][2])
     edges = np.linspace(0.0, height, max(4, round(height / diameter)) + 1)
     sectors, bridges = silo.sectors(diameter), wall_bridges(values)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import pyvista
+from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
+from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
+from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
 
 from .frames import HINT, Array, CutOffError, Dump, DumpError, DumpWarning, Entry, RawFrame, numbered
 from .source import Source
@@ -23,11 +26,7 @@ _OTHER_NAMES = {"radii": "radius", "velocity_lin": "v", "velocity_ang": "omega",
 
 
 def read_vtk(path: Path) -> Any:
-    """The vtkDataSet in a file, legacy or XML whatever it is called; DumpError when VTK reports an error."""
-    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
-    from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
-    from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
-
+    """The data set in a file, legacy or XML whatever it is called; DumpError when VTK reports an error."""
     reader = vtkGenericDataObjectReader() if Source(path).begins_with(b"# vtk") else vtkXMLGenericDataObjectReader()
     reader.SetFileName(str(path))
     said, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
@@ -42,44 +41,36 @@ def read_vtk(path: Path) -> Any:
         vtkLogger.SetStderrVerbosity(loud)
     if found is None or not found.IsA("vtkDataSet") or reader.GetErrorCode() or "ERROR" in said.GetOutput():
         raise CutOffError(f"{path}: truncated, VTK's reader cannot read it ({HINT})")
-    return found
+    return pyvista.wrap(found)
 
 
 def _table(data: Any, where: str) -> dict[str, Array]:
     """Columns of a dataset, named as those of a text dump."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    # VTK's function has no types.
-    plain: Callable[[Any], NDArray[Any]] = vtk_to_numpy
-
-    def arrays(part: Any) -> dict[str, Array]:
-        numeric = [part.GetArray(number) for number in range(part.GetNumberOfArrays()) if part.GetArray(number)]
-        return {array.GetName(): plain(array).astype(float) for array in numeric}
-
-    points = plain(data.GetPoints().GetData()).astype(float) if data.GetNumberOfPoints() else np.empty((0, 3))
+    points, cells, nodes = np.asarray(data.points, float), data.cell_data, data.point_data
     columns: dict[str, Array] = {}
     if not len(points):
         # Written when no grain or contact was there. What its columns would be is in other files, which may be of another kind than this.
         return columns
-    if data.GetCellData().GetArray("id1") is not None or data.GetPointData().GetNumberOfArrays() == 0:
-        ends = points.reshape(-1, 6)
-        held = arrays(data.GetCellData())
+    if "id1" in cells or not len(nodes):
+        ends, held = points.reshape(-1, 6), dict(cells.items())
         if any(len(values) != len(ends) for values in held.values()):
             raise DumpError(f"{where}: its lines do not have two ends each")
         columns |= {f"{axis}{end + 1}": ends[:, 3 * end + n] for end in (0, 1) for n, axis in enumerate(_AXES)}
     else:
-        held = arrays(data.GetPointData())
-        held = {_OTHER_NAMES.get(name, name): values for name, values in held.items()}
+        held = {_OTHER_NAMES.get(name, name): values for name, values in nodes.items()}
         columns |= {axis: points[:, n] for n, axis in enumerate(_AXES)}
-    for name, values in held.items():
-        base = re.sub(r"\[1-\d+\]$", "", name)
-        parts = values.reshape(len(values), -1).T if values.ndim > 1 else None
-        if parts is None:
+    for name, array in held.items():
+        values = np.asarray(array)
+        if values.dtype.kind not in "biuf":
+            continue
+        values = values.astype(float)
+        if values.ndim == 1:
             columns[name] = values
         elif name in _VECTORS:
-            columns |= {f"{name}{axis}": part for axis, part in zip(_AXES, parts, strict=True)}
+            columns |= {f"{name}{axis}": part for axis, part in zip(_AXES, values.T, strict=True)}
         else:
-            columns |= {f"{base}[{n}]": part for n, part in enumerate(parts, 1)}
+            base = re.sub(r"\[1-\d+\]$", "", name)
+            columns |= {f"{base}[{n}]": part for n, part in enumerate(values.T, 1)}
     return columns
 
 
@@ -87,15 +78,15 @@ def _box(path: Path, columns: dict[str, Array]) -> tuple[Array, Array, Array]:
     """Corners and tilt of the box from the file that the engine writes with it, else the grains' extent."""
     head, step, _ = _split(path)
     # The box of a .vtp or .vtu lies in a .vtr, or in a .vtu when it is tilted.
-    for beside in (path.with_name(f"{head}{BOX}{step}{suffix}") for suffix in (path.suffix, ".vtu", ".vtr")):
-        if not beside.is_file():
+    for boxed in (path.with_name(f"{head}{BOX}{step}{suffix}") for suffix in (path.suffix, ".vtu", ".vtr")):
+        if not boxed.is_file():
             continue
-        data = read_vtk(beside)
-        if data.GetNumberOfPoints() == 8 and data.IsA("vtkUnstructuredGrid"):
-            corner = np.array([data.GetPoint(n) for n in range(8)])
+        data = read_vtk(boxed)
+        if data.n_points == 8 and isinstance(data, pyvista.UnstructuredGrid):
+            corner = np.asarray(data.points, float)
             a, b, c = corner[1] - corner[0], corner[3] - corner[0], corner[4] - corner[0]
             return corner[0], corner[0] + (a[0], b[1], c[2]), np.array([b[0], c[0], c[1]])
-        bounds = np.array(data.GetBounds()).reshape(3, 2)
+        bounds = np.array(data.bounds).reshape(3, 2)
         return bounds[:, 0], bounds[:, 1], np.zeros(3)
     places = [columns.get(axis, columns.get(f"{axis}1", np.zeros(0))) for axis in _AXES]
     reach = columns.get("radius", np.zeros(1)).max(initial=0.0)
@@ -119,7 +110,7 @@ def _split(path: Path) -> tuple[str, str, str]:
 class VtkFile(Dump):
     """One VTK file as a dump with one frame. The step is the last number in its name, coordinates are single precision as VTK has them.
 
-    The box is read from the file ...boundingBox_... that the engine writes beside; no axis is called periodic, for no file says it.
+    The box is read from the file ...boundingBox_... that the engine writes with it; no axis is called periodic, for no file says it.
     """
 
     def __init__(self, path: Path, *, units: str = "") -> None:

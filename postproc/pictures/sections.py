@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,7 +10,6 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import Normalize
@@ -188,8 +188,6 @@ def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
             marks = section.drum_radius * np.column_stack([np.cos(angles), np.sin(angles)])
             axes.add_collection(LineCollection(list(np.stack([marks, 1.035 * marks], axis=1)), colors=_SHELL, linewidths=1.2))
         axes.set(xlim=(left, right), ylim=(bottom, upper))
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy()).quantize(32))
+        images.append(Image.open(io.BytesIO(saved(figure, dots=_DOTS))).convert("RGB").quantize(32))
     images[0].save(path, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
     return path

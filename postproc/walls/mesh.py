@@ -59,12 +59,13 @@ def cut(triangles: Array, place: float = 0.0) -> Array:
 def surface_of(triangles: Array) -> pyvista.PolyData:
     """`triangles` (t, 3, 3) as cells, each with corners of its own."""
     corners = np.ascontiguousarray(triangles.reshape(-1, 3), float)
-    return pyvista.PolyData.from_regular_faces(corners, np.arange(len(corners)).reshape(-1, 3))
+    return pyvista.PolyData.from_regular_faces(corners, np.arange(len(corners), dtype=int).reshape(-1, 3).tolist())
 
 
 def nearest(surface: pyvista.PolyData, points: Array) -> tuple[Array, Integers]:
     """Nearest points (k, 3) of the surface and their triangles (k,) for `points` (k, 3); of equally near triangles any one."""
     if not len(points):
         return np.empty((0, 3)), np.empty(0, np.int64)
-    which, found = surface.find_closest_cell(points, return_closest_point=True)
-    return np.asarray(found, float).reshape(-1, 3), np.atleast_1d(np.asarray(which, np.int64))
+    # The types of PyVista miss that these are two.
+    which, found = surface.find_closest_cell(points.reshape(-1, 3), return_closest_point=True)  # type: ignore[misc]
+    return np.asarray(found, float), np.asarray(which, np.int64)

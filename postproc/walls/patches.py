@@ -185,7 +185,6 @@ def box_patches(wall: Wall | Inclusion, frame: GrainFrame, size: float) -> Patch
     spans = [_steps(low, high, size) for low, high in zip(coordinates.min(axis=0), coordinates.max(axis=0), strict=True)]
     if isinstance(wall, PlaneWall):
         return plane_patches(wall, *spans)
-    assert isinstance(wall, CylinderWall)
     return cylinder_patches(wall, count_of(_TURN * wall.radius, size), spans[1])
 
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import pyvista
@@ -28,24 +27,6 @@ class Places:
     points: Array
     basis: Array
     coordinates: Array
-
-
-class Wall(Protocol):
-    """What the functions here need of a wall."""
-
-    @property
-    def name(self) -> str:
-        """Its name in files and messages."""
-
-    @property
-    def motion(self) -> Motion:
-        """How it moves."""
-
-    def at(self, time: float) -> Wall:
-        """The wall where it is at `time` (s)."""
-
-    def places(self, centres: Array) -> Places:
-        """Where grains with these `centres` (k, 3) in m touch it."""
 
 
 def _unit(vector: Vector, what: str) -> Array:
@@ -231,3 +212,6 @@ class MeshWall:
         side = np.where(np.einsum("ka,ka->k", centres - points, basis[:, 0]) < 0.0, -1.0, 1.0)
         basis[:, 0] *= side[:, None]
         return Places(points, basis, np.column_stack([triangle, np.zeros(len(triangle))]))
+
+
+Wall = PlaneWall | CylinderWall | MeshWall
