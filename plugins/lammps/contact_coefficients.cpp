@@ -6,6 +6,8 @@
 #include "error.h"
 #include "utils.h"
 
+#include "dembark/capillary/bridge_law.hpp"
+
 using namespace LAMMPS_NS;
 using dembark::ContactParameters;
 

@@ -16,6 +16,7 @@
 #include "property_registry.h"
 #include "update.h"
 
+#include "dembark/capillary/bridge_law.hpp"
 #include "dembark/contact.hpp"
 #include "dembark/pair_table.hpp"
 #include "engine_access.h"

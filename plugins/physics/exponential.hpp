@@ -2,9 +2,21 @@
 // without contraction (-ffp-contract=off), on every processor, which the C library does not promise.
 #pragma once
 
-#include "pack.hpp"
+#include <cstring>
+
+#include "vec3.hpp"
 
 namespace dembark {
+
+/// `value` times two to the integer in the last bits of `exponent`, where both are normal numbers.
+DEMBARK_HOT double times_power_of_two(double value, double exponent) {
+  unsigned long long bits, more;
+  std::memcpy(&bits, &value, sizeof bits);
+  std::memcpy(&more, &exponent, sizeof more);
+  bits += more << 52;
+  std::memcpy(&value, &bits, sizeof value);
+  return value;
+}
 
 /// exp(x) for x < 700, to 2.2e-16 of the value; 0 below -700 and for what is no number.
 ///

@@ -90,7 +90,7 @@ DEMBARK_HOT Real friction_coefficient(const Law& law, Real slip) {
 
 /// T_max (N), equation (2), for a friction coefficient mu.
 template <class Real>
-inline Real shear_limit(const FinnieRabinowicz& law, Real mu, Real normal_force, Real contact_area) {
+DEMBARK_FUNCTION inline Real shear_limit(const FinnieRabinowicz& law, Real mu, Real normal_force, Real contact_area) {
   using std::expm1;
   if (!(normal_force > 0.0)) return Real(0.0);
   const Real coulomb = mu * normal_force;
@@ -132,7 +132,8 @@ DEMBARK_HOT Real slip_to_coulomb(const Law& law, Real k_t, Real trial, Real slip
 
 /// The same with any interface. Beside a shear strength the residual need not be concave everywhere, and the search begins at the largest
 /// possible slip.
-inline double slip_to_limit(const FinnieRabinowicz& law, double k_t, double trial, double slip, double normal_force, double contact_area) {
+DEMBARK_FUNCTION inline double slip_to_limit(const FinnieRabinowicz& law, double k_t, double trial, double slip, double normal_force,
+                                             double contact_area) {
   if (law.interface_shear_strength >= unlimited_strength)
     return slip_to_coulomb(law, k_t, trial, slip, friction_coefficient(law, slip), normal_force, true);
   const double kinetic_limit = shear_limit(law, law.kinetic_friction, normal_force, contact_area);
@@ -158,7 +159,7 @@ inline double slip_to_limit(const FinnieRabinowicz& law, double k_t, double tria
 
 /// The share of its slip that a contact keeps when it sticks for `dt` (s).
 template <class Real>
-inline Real kept_slip(const FinnieRabinowicz& law, Real dt) {
+DEMBARK_FUNCTION inline Real kept_slip(const FinnieRabinowicz& law, Real dt) {
   using std::exp;
   return law.healing_time > 0.0 ? exp(-dt / law.healing_time) : Real(0.0);
 }

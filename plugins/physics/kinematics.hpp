@@ -6,7 +6,7 @@
 namespace dembark {
 
 /// Whether this "normal" is that of coincident centres: any direction would be a guess.
-inline bool has_no_direction(const Vec3<double>& normal) { return !(dot(normal, normal) < 2.0); }
+DEMBARK_FUNCTION inline bool has_no_direction(const Vec3<double>& normal) { return !(dot(normal, normal) < 2.0); }
 
 /// Motion of body 1 against body 2 at the contact.
 template <class Real>

@@ -30,18 +30,18 @@ enum class NormalLaw { hertz, hooke };
 inline std::vector<std::string> normal_law_names() { return {"hertz", "hooke"}; }
 
 /// Effective Young's modulus (Pa) of two materials, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
-inline double effective_youngs_modulus(double youngs_1, double poisson_1, double youngs_2, double poisson_2) {
+DEMBARK_FUNCTION inline double effective_youngs_modulus(double youngs_1, double poisson_1, double youngs_2, double poisson_2) {
   return 1.0 / ((1.0 - poisson_1 * poisson_1) / youngs_1 + (1.0 - poisson_2 * poisson_2) / youngs_2);
 }
 
 /// Effective shear modulus (Pa), 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 with G = E / (2 (1 + nu)).
-inline double effective_shear_modulus(double youngs_1, double poisson_1, double youngs_2, double poisson_2) {
+DEMBARK_FUNCTION inline double effective_shear_modulus(double youngs_1, double poisson_1, double youngs_2, double poisson_2) {
   return 1.0 / (2.0 * (2.0 - poisson_1) * (1.0 + poisson_1) / youngs_1 + 2.0 * (2.0 - poisson_2) * (1.0 + poisson_2) / youngs_2);
 }
 
 /// R* or m* of two bodies; an infinite partner (a wall) leaves the other's value. Infinite if both are.
 template <class Real>
-inline Real reduced(Real a, Real b) {
+DEMBARK_FUNCTION inline Real reduced(Real a, Real b) {
   using std::isinf;
   if (isinf(b)) return a;
   if (isinf(a)) return b;
@@ -63,7 +63,7 @@ struct NormalResponse {
 };
 
 /// beta = ln e / sqrt(ln^2 e + pi^2), in (-1, 0].
-inline double damping_factor(double restitution) {
+DEMBARK_FUNCTION inline double damping_factor(double restitution) {
   const double log_e = std::log(restitution);
   return log_e / std::sqrt(log_e * log_e + pi * pi);
 }
@@ -100,8 +100,8 @@ DEMBARK_HOT NormalResponse<Real> hertz(const Parameters& p, Real effective_radiu
 
 /// `characteristic_velocity` v_c, m/s, > 0: impact speed at which the overlap equals that of Hertz.
 template <class Real>
-inline NormalResponse<Real> hooke(const HertzParameters& p, double characteristic_velocity, Real effective_radius, Real effective_mass,
-                                  Real overlap, Real normal_velocity) {
+DEMBARK_FUNCTION inline NormalResponse<Real> hooke(const HertzParameters& p, double characteristic_velocity, Real effective_radius,
+                                                   Real effective_mass, Real overlap, Real normal_velocity) {
   using std::pow;
   using std::sqrt;
   const Real rigidity = sqrt(effective_radius) * p.effective_youngs_modulus;

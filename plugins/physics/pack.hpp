@@ -130,14 +130,6 @@ DEMBARK_HOT Pack<N, Set> times_power_of_two(const Pack<N, Set>& value, const Pac
   typedef typename detail::Vectors<N>::Bits Bits;
   return typename Pack<N, Set>::Lanes(Bits(value.lanes) + (Bits(exponent.lanes) << 52));
 }
-inline double times_power_of_two(double value, double exponent) {
-  unsigned long long bits, more;
-  __builtin_memcpy(&bits, &value, sizeof bits);
-  __builtin_memcpy(&more, &exponent, sizeof more);
-  bits += more << 52;
-  __builtin_memcpy(&value, &bits, sizeof value);
-  return value;
-}
 
 /// Sum of the lanes of `Count` packs, as halves of what they hold, halves of that, and so on: the same bits from packs of any size.
 template <int N, class Set, std::size_t Count>

@@ -23,7 +23,9 @@
 
 #include "finnie_rabinowicz.hpp"
 #include "normal_force.hpp"  // pi
+#ifndef DEMBARK_DEVICE
 #include "pack.hpp"
+#endif
 
 namespace dembark {
 
@@ -41,16 +43,22 @@ struct SlipRings {
 
 namespace detail {
 
+struct RingEdges {
+  double at[SlipRings::count + 1] = {1.0};
+  constexpr RingEdges() {
+    for (int i = 1; i < SlipRings::count; ++i) at[i] = at[i - 1] / SlipRings::ratio;
+  }
+};
 /// Edges of the rings, in units of `outer`; the outer edge of a ring is the inner one of the ring before.
-inline constexpr auto ring_edges = [] {
-  std::array<double, SlipRings::count + 1> edges{1.0};
-  for (int i = 1; i < SlipRings::count; ++i) edges[i] = edges[i - 1] / SlipRings::ratio;
-  return edges;
-}();
+DEMBARK_HOT const double* ring_edges() {
+  static constexpr RingEdges edges;  // in a function: device code cannot use a constant array of the processor
+  return edges.at;
+}
 
 /// How far ring i lies inside of the radius a (m).
-inline double ring_width(const SlipRings& rings, int i, double a) {
-  return std::min(rings.outer * ring_edges[i], a) - std::min(rings.outer * ring_edges[i + 1], a);
+DEMBARK_FUNCTION inline double ring_width(const SlipRings& rings, int i, double a) {
+  const double* const edges = ring_edges();
+  return std::min(rings.outer * edges[i], a) - std::min(rings.outer * edges[i + 1], a);
 }
 
 /// What a ring bears of the normal force over what it has of the stiffness; edges in units of the contact radius.
@@ -62,7 +70,7 @@ DEMBARK_HOT Real pressure(const Real& high, const Real& low) {
 }  // namespace detail
 
 /// Elastic energy (J) of the springs for k_t (N/m).
-inline double stored_energy(const SlipRings& rings, double stiffness) {
+DEMBARK_FUNCTION inline double stored_energy(const SlipRings& rings, double stiffness) {
   if (!(rings.radius > 0.0)) return 0.0;
   double sum = 0.0;
   for (int i = 0; i < SlipRings::count; ++i)
@@ -83,22 +91,33 @@ DEMBARK_HOT auto edges_stay(const Real& outer, const Real& radius, const Real& a
   return (radius > 0.0) & !(a > outer) & !(a * SlipRings::ratio < outer);
 }
 
+/// The displacements of the rings when the edges have moved outwards by a ring: the two innermost, of these widths, become one.
+DEMBARK_FUNCTION inline void move_outwards(std::array<double, SlipRings::count>& u, double middle, double next) {
+  constexpr int last = SlipRings::count - 1;
+  if (middle + next > 0.0) u[last] = (middle * u[last] + next * u[last - 1]) / (middle + next);
+  for (int i = last - 1; i > 0; --i) u[i] = u[i - 1];
+  u[0] = 0.0;
+}
+
+/// The same inwards: the outermost has left the contact, the innermost becomes two.
+DEMBARK_FUNCTION inline void move_inwards(std::array<double, SlipRings::count>& u) {
+  for (int i = 0; i < SlipRings::count - 1; ++i) u[i] = u[i + 1];
+}
+
 /// The rings of a contact whose radius `a` (m) leaves its first ring: edges move by whole rings. Returns the energy lost (J) per k_t.
 DEMBARK_COLD inline double shift(SlipRings& rings, double a) {
   const double held = stored_energy(rings, 1.0);
   constexpr int last = SlipRings::count - 1;
   if (!(rings.outer > 0.0)) rings.outer = a;
-  while (a > rings.outer) {  // the two innermost rings become one
+  while (a > rings.outer) {
     const double middle = ring_width(rings, last, rings.radius), next = ring_width(rings, last - 1, rings.radius);
-    for (auto* u : {&rings.along, &rings.across}) {
-      if (middle + next > 0.0) (*u)[last] = (middle * (*u)[last] + next * (*u)[last - 1]) / (middle + next);
-      std::copy_backward(u->begin(), u->end() - 2, u->end() - 1);
-      (*u)[0] = 0.0;
-    }
+    move_outwards(rings.along, middle, next);
+    move_outwards(rings.across, middle, next);
     rings.outer *= SlipRings::ratio;
   }
-  while (a * SlipRings::ratio < rings.outer) {  // the outermost has left the contact, the innermost becomes two
-    for (auto* u : {&rings.along, &rings.across}) std::copy(u->begin() + 1, u->end(), u->begin());
+  while (a * SlipRings::ratio < rings.outer) {
+    move_inwards(rings.along);
+    move_inwards(rings.across);
     rings.outer /= SlipRings::ratio;
   }
   for (int i = 0; i <= last; ++i) {  // springs that join are without load
@@ -154,7 +173,7 @@ DEMBARK_HOT RingStep<Real> ring_step(const Vec3<Real>& axis, Real outer, Real ra
   s.axis *= 1.5 - 0.5 * length;
   s.other = cross(normal, s.axis);
   s.radius = sqrt(contact_area / pi);
-  const Real edge = outer * detail::ring_edges[1], before = radius - edge, now = s.radius - edge;
+  const Real edge = outer * detail::ring_edges()[1], before = radius - edge, now = s.radius - edge;
   const auto grows = now > before;
   const Real kept = select(grows, before / now, Real(1.0));
   s.motion = {outer / s.radius,
@@ -172,23 +191,57 @@ struct RingSums {
   double along, across, lost;
 };
 
-/// The step of the rings of one contact, in place, as many at a time as a pack `P` has lanes. `limit` (N): of the whole contact. Returns
-/// whether the middle ring would pass its limit; nothing has changed then, unless the contact is known to be `sliding` as a whole.
+namespace detail {
+
+/// Rings that are worked on at once: as many as a pack has lanes, or one as a plain number.
+template <class P>
+struct Lanes {
+  static constexpr int count = P::size;
+  DEMBARK_HOT static P load(const double* from) { return P::load(from); }
+  DEMBARK_HOT static void store(const P& p, double* to) { p.store(to); }
+  DEMBARK_HOT static void set_first(P& p, double value) { p.lanes[0] = value; }
+  DEMBARK_HOT static void scale_first(P& p, double factor) { p.lanes[0] *= factor; }
+};
+template <>
+struct Lanes<double> {
+  static constexpr int count = 1;
+  DEMBARK_HOT static double load(const double* from) { return *from; }
+  DEMBARK_HOT static void store(double p, double* to) { *to = p; }
+  DEMBARK_HOT static void set_first(double& p, double value) { p = value; }
+  DEMBARK_HOT static void scale_first(double& p, double factor) { p *= factor; }
+};
+
+#ifdef DEMBARK_DEVICE
+typedef double RingLanes;
+#else
+typedef Pack<2> RingLanes;
+#endif
+
+}  // namespace detail
+
+/// The step of the rings of one contact, in place, as many at a time as a pack `P` has lanes, with the same bits for any. `limit` (N): of
+/// the whole contact. Returns whether the middle ring would pass its limit; nothing has changed then, unless the contact is known to be
+/// `sliding` as a whole.
 template <class P>
 DEMBARK_HOT bool move_rings(const RingMotion<double>& motion, double limit, bool sliding, double* along, double* across, RingSums& sums) {
-  constexpr int N = P::size, parts = SlipRings::count / N;
+  using std::sqrt;
+  typedef detail::Lanes<P> Lanes;
+  constexpr int N = Lanes::count, parts = SlipRings::count / N;
+  const double* const edges = detail::ring_edges();
   const double first = along[0] * along[0] + across[0] * across[0], reach = limit / motion.stiffness;
   P sum_along[parts], sum_across[parts], lost[parts];
   bool slipped = false;
-#pragma GCC unroll 4
+#ifndef __NVCC__  // which unrolls by itself
+#pragma GCC unroll 8
+#endif
   for (int part = parts - 1; part >= 0; --part) {
     const int at = part * N;
-    P high = motion.size * P::load(&detail::ring_edges[at]), x = P::load(along + at), y = P::load(across + at);
-    const P low = motion.size * P::load(&detail::ring_edges[at + 1]);
+    P high = motion.size * Lanes::load(edges + at), x = Lanes::load(along + at), y = Lanes::load(across + at);
+    const P low = motion.size * Lanes::load(edges + at + 1);
     if (part == 0) {
-      high.lanes[0] = 1.0;
-      x.lanes[0] *= motion.kept;
-      y.lanes[0] *= motion.kept;
+      Lanes::set_first(high, 1.0);
+      Lanes::scale_first(x, motion.kept);
+      Lanes::scale_first(y, motion.kept);
     }
     const P width = high - low, most = reach * detail::pressure(high, low), start_x = x, start_y = y;
     x += motion.along;
@@ -204,8 +257,8 @@ DEMBARK_HOT bool move_rings(const RingMotion<double>& motion, double limit, bool
       lost[part] = width * ((start_x + x) * slid_x + (start_y + y) * slid_y);
       slipped = true;
     }
-    x.store(along + at);
-    y.store(across + at);
+    Lanes::store(x, along + at);
+    Lanes::store(y, across + at);
     sum_along[part] = width * x;
     sum_across[part] = width * y;
   }
@@ -216,10 +269,10 @@ DEMBARK_HOT bool move_rings(const RingMotion<double>& motion, double limit, bool
 
 /// The limit (N) of a contact that slides as a whole, to go on with in move_rings(): the return of the middle ring to the limit curve,
 /// which adds to the `slip` (m).
-inline double sliding_limit(const FinnieRabinowicz& law, const RingMotion<double>& motion, const double* along, const double* across,
-                            double normal_force, double contact_area, double& slip) {
+DEMBARK_FUNCTION inline double sliding_limit(const FinnieRabinowicz& law, const RingMotion<double>& motion, const double* along,
+                                             const double* across, double normal_force, double contact_area, double& slip) {
   constexpr int middle = SlipRings::count - 1;
-  const double softness = detail::pressure(motion.size * detail::ring_edges[middle], 0.0) / motion.stiffness;
+  const double softness = detail::pressure(motion.size * detail::ring_edges()[middle], 0.0) / motion.stiffness;
   const double x = along[middle] + motion.along, y = across[middle] + motion.across, trial = std::sqrt(x * x + y * y);
   const double more = detail::slip_to_limit(law, 1.0 / softness, trial, slip, normal_force, contact_area);
   slip += more;
@@ -229,9 +282,10 @@ inline double sliding_limit(const FinnieRabinowicz& law, const RingMotion<double
 /// One step of the law with partial slip: as friction_step(), with `rings` in the contact plane of the last step, which turns to `normal`
 /// and by `twist` (rad, see rotate_to_plane). The radius of the contact follows from its area. `state.displacement` becomes the linear
 /// spring's that carries the same force.
-inline Vec3<double> partial_slip_step(const FinnieRabinowicz& law, const Vec3<double>& normal, double twist, double normal_force,
-                                      double stiffness, double damping, double contact_area, const Vec3<double>& velocity, double dt,
-                                      FrictionState<double>& state, SlipRings& rings) {
+DEMBARK_FUNCTION inline Vec3<double> partial_slip_step(const FinnieRabinowicz& law, const Vec3<double>& normal, double twist,
+                                                       double normal_force, double stiffness, double damping, double contact_area,
+                                                       const Vec3<double>& velocity, double dt, FrictionState<double>& state,
+                                                       SlipRings& rings) {
   // The forces of a moment that is over; see friction_step().
   if (dt == 0.0 && state.slip > 0.0 && detail::was_sliding(law, normal_force, stiffness, contact_area, state))
     return -stiffness * rotate_to_plane(state.displacement, normal, twist);
@@ -257,7 +311,7 @@ inline Vec3<double> partial_slip_step(const FinnieRabinowicz& law, const Vec3<do
   double *const along = rings.along.data(), *const across = rings.across.data();
   bool slides = false;
   RingSums sums;
-  while (move_rings<Pack<2>>(step.motion, limit, slides, along, across, sums)) {
+  while (move_rings<detail::RingLanes>(step.motion, limit, slides, along, across, sums)) {
     slides = true;
     limit = sliding_limit(law, step.motion, along, across, normal_force, contact_area, state.slip);
   }

@@ -41,7 +41,7 @@ struct RollingResistance {
   double friction = 0.0;       ///< mu_r, >= 0
   double damping_ratio = 0.0;  ///< eta, >= 0, of (2); 1 = critical
 
-  bool on() const { return model != RollingModel::off && friction > 0.0; }
+  DEMBARK_FUNCTION bool on() const { return model != RollingModel::off && friction > 0.0; }
   /// The one clear line about what is wrong with these parameters, or nullptr.
   const char* error() const {
     if (!(friction >= 0.0) || std::isinf(friction)) return "rolling friction must be a number >= 0";
@@ -51,12 +51,12 @@ struct RollingResistance {
 };
 
 /// I (kg m^2) of two spheres of these masses (kg; infinite = a wall, or held) and radii (m).
-inline double relative_inertia(double mass_1, double radius_1, double mass_2, double radius_2) {
+DEMBARK_FUNCTION inline double relative_inertia(double mass_1, double radius_1, double mass_2, double radius_2) {
   return reduced(0.4 * mass_1 * radius_1 * radius_1, 0.4 * mass_2 * radius_2 * radius_2);
 }
 
 /// k_r (N m/rad) of (2).
-inline double rolling_stiffness(double tangential_stiffness, double effective_radius) {
+DEMBARK_FUNCTION inline double rolling_stiffness(double tangential_stiffness, double effective_radius) {
   return tangential_stiffness * effective_radius * effective_radius;
 }
 
@@ -73,7 +73,7 @@ struct RollingContact {
 
 /// One step of the law: the couple (N m) on body 1; body 2 gets its negative. `dt` in s; 0 asks for the couple of the moment. `angle`:
 /// theta (rad), which the contact keeps from touch to end.
-inline Vec3<double> rolling_step(const RollingResistance& law, const RollingContact& c, double dt, Vec3<double>& angle) {
+DEMBARK_FUNCTION inline Vec3<double> rolling_step(const RollingResistance& law, const RollingContact& c, double dt, Vec3<double>& angle) {
   if (!law.on()) return {};
   const double most = law.friction * c.effective_radius * std::max(c.normal_force, 0.0);
   const Vec3<double> rolling = c.spin - dot(c.spin, c.normal) * c.normal;

@@ -2,14 +2,25 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
-// The common path of a law belongs into the engine's pair loop, where a call costs as much as the law; its rare branches do not.
-#if defined(__GNUC__)
-#define DEMBARK_HOT __attribute__((always_inline)) inline
-#define DEMBARK_COLD __attribute__((noinline, cold))
+// Each function that runs per contact begins with one of three words. With CUDA's and HIP's compilers, which Kokkos calls too, it is
+// compiled for the processor and for the device (docs/development/device_code.md); other compilers see a plain function.
+//   DEMBARK_FUNCTION  the compiler decides whether it is inlined
+//   DEMBARK_HOT       always inlined: the common path of a law, where a call would cost as much as the law
+//   DEMBARK_COLD      never inlined: its rare branches
+#if defined(__CUDACC__) || defined(__HIPCC__)
+#define DEMBARK_DEVICE
+#define DEMBARK_FUNCTION __host__ __device__
 #else
-#define DEMBARK_HOT inline
-#define DEMBARK_COLD
+#define DEMBARK_FUNCTION
+#endif
+#if defined(__GNUC__)
+#define DEMBARK_HOT DEMBARK_FUNCTION __attribute__((always_inline)) inline
+#define DEMBARK_COLD DEMBARK_FUNCTION __attribute__((noinline, cold))
+#else
+#define DEMBARK_HOT DEMBARK_FUNCTION inline
+#define DEMBARK_COLD DEMBARK_FUNCTION
 #endif
 
 namespace dembark {
@@ -20,6 +31,19 @@ DEMBARK_HOT Real select(bool condition, Real yes, Real no) {
   return condition ? yes : no;
 }
 DEMBARK_HOT bool any(bool condition) { return condition; }
+DEMBARK_HOT unsigned bits(bool condition) { return condition; }
+
+/// Sum of `Count` numbers as halves, halves of halves, and so on: the order in which packs are added up.
+template <std::size_t Count>
+DEMBARK_HOT double sum(const double (&numbers)[Count]) {
+  static_assert((Count & (Count - 1)) == 0);
+  if constexpr (Count == 1) return numbers[0];
+  else {
+    double half[Count / 2];
+    for (std::size_t k = 0; k < Count / 2; ++k) half[k] = numbers[k] + numbers[k + Count / 2];
+    return sum(half);
+  }
+}
 
 template <class Real>
 struct Vec3 {
@@ -77,7 +101,7 @@ DEMBARK_HOT Vec3<Real> cross(const Vec3<Real>& a, const Vec3<Real>& b) {
 }
 
 template <class Real>
-inline Real norm(const Vec3<Real>& a) {
+DEMBARK_FUNCTION inline Real norm(const Vec3<Real>& a) {
   using std::sqrt;
   return sqrt(dot(a, a));
 }

@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "dembark/capillary/bridge_law.hpp"
 #include "dembark/contact.hpp"
 
 namespace nb = nanobind;
@@ -47,8 +48,12 @@ Option option_of(const std::string& what, const std::vector<std::string>& names,
   throw std::invalid_argument(what + " must be " + known + ", not '" + word + "'");
 }
 
-capillary::BridgeForce bridge_force(const std::string& model, double contact_angle) {
-  return {option_of<capillary::Model>("capillary model", capillary::model_names(), model), contact_angle};
+/// Unequal spheres are solved for when they come.
+capillary::BridgeLaw bridge_law(const std::string& model, double contact_angle) {
+  return {option_of<capillary::Model>("capillary model", capillary::model_names(), model), contact_angle, capillary::Pairs::equal};
+}
+void complete_for(capillary::BridgeLaw& law, double radius_1, double radius_2) {
+  if (radius_1 != radius_2) law.complete();
 }
 
 Vec3<double> vector(const nb::tuple& t) { return {nb::cast<double>(t[0]), nb::cast<double>(t[1]), nb::cast<double>(t[2])}; }
@@ -57,7 +62,7 @@ nb::tuple tuple(const Vec3<double>& v) { return nb::make_tuple(v.x, v.y, v.z); }
 /// Bridge law and contact parameters with the lifetime of the Python object that uses them.
 struct Contact {
   ContactParameters parameters;
-  std::shared_ptr<const capillary::BridgeForce> bridge;
+  std::shared_ptr<capillary::BridgeLaw> bridge;
   ContactState state;
 };
 
@@ -81,20 +86,25 @@ NB_MODULE(_physics, m) {
   m.attr("unlimited_strength") = unlimited_strength;
   m.def("capillary_models", &capillary::model_names);
 
-  nb::class_<capillary::BridgeForce>(m, "BridgeForce")
+  nb::class_<capillary::BridgeLaw>(m, "BridgeForce")
       .def(
           "__init__",
-          [](capillary::BridgeForce* self, const std::string& model, double contact_angle) {
-            new (self) capillary::BridgeForce(bridge_force(model, contact_angle));
+          [](capillary::BridgeLaw* self, const std::string& model, double contact_angle) {
+            new (self) capillary::BridgeLaw(bridge_law(model, contact_angle));
           },
           "model"_a, "contact_angle"_a)
       .def("force",
-           [](const capillary::BridgeForce& self, Array radius_1, Array radius_2, Array gap, Array volume, Array surface_tension) {
-             return filled(gap.shape(0),
-                           [&](std::size_t i) { return self.force(radius_1(i), radius_2(i), gap(i), volume(i), surface_tension(i)); });
+           [](capillary::BridgeLaw& self, Array radius_1, Array radius_2, Array gap, Array volume, Array surface_tension) {
+             return filled(gap.shape(0), [&](std::size_t i) {
+               complete_for(self, radius_1(i), radius_2(i));
+               return self.force(radius_1(i), radius_2(i), gap(i), volume(i), surface_tension(i));
+             });
            })
-      .def("rupture_distance", [](const capillary::BridgeForce& self, Array radius_1, Array radius_2, Array volume) {
-        return filled(volume.shape(0), [&](std::size_t i) { return self.rupture_distance(radius_1(i), radius_2(i), volume(i)); });
+      .def("rupture_distance", [](capillary::BridgeLaw& self, Array radius_1, Array radius_2, Array volume) {
+        return filled(volume.shape(0), [&](std::size_t i) {
+          complete_for(self, radius_1(i), radius_2(i));
+          return self.rupture_distance(radius_1(i), radius_2(i), volume(i));
+        });
       });
 
   m.def("viscous_resistance", [](Array radius, Array gap, Array volume, Array viscosity, Array minimum_gap) {
@@ -177,7 +187,7 @@ NB_MODULE(_physics, m) {
                                  {},
                                  rolling}};
              if (bridge_volume > 0.0) {
-               self->bridge = std::make_shared<const capillary::BridgeForce>(bridge_force(capillary_model, contact_angle));
+               self->bridge = std::make_shared<capillary::BridgeLaw>(bridge_law(capillary_model, contact_angle));
                self->parameters.liquid = {self->bridge.get(), surface_tension, bridge_volume, {viscosity, minimum_gap}};
              }
            })
@@ -187,6 +197,7 @@ NB_MODULE(_physics, m) {
              ContactBodies b{vector(separation), vector(v1), vector(v2), vector(w1), vector(w2), radius_1, radius_2, mass_1, mass_2, {}};
              // The velocity of a wall is that of its surface, with what its spin has in it.
              if (std::isinf(radius_2)) std::swap(b.angular_velocity_2, b.wall_spin);
+             if (self.bridge) complete_for(*self.bridge, radius_1, radius_2);
              const ContactState before = self.state;
              const ContactForce f = contact_step(self.parameters, b, dt, self.state, update);
              // A comparison with what is no number is false: such a contact would end without a word.

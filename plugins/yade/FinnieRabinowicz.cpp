@@ -18,6 +18,8 @@
 #include "ContactView.hpp"
 #include "report.hpp"
 
+#include "dembark/capillary/bridge_law.hpp"
+
 namespace yade {
 
 YADE_PLUGIN((FinnieRabinowiczPhys)(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys)(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz));

@@ -1,7 +1,7 @@
 // Capillary force of a pendular liquid bridge between two spheres, or a sphere and a wall.
 //
 //   exact         the stable axisymmetric bridge (equation of Young and Laplace, no gravity) between the spheres as they are, from tables
-//                 built once: about 70 ms of one core for equal spheres, and 0.25 s more with the first unequal pair or wall.
+//                 built once: about 70 ms of one core for equal spheres, and 0.25 s more for unequal ones and walls.
 //                 docs/theory/capillary.md has the errors. The tables span V/R^3 = 1e-9...1 and angles up to 90 degrees;
 //                 smaller volumes go on by similarity, larger ones act as V/R^3 = 1
 //   willett       closed form and
@@ -18,11 +18,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <deque>
-#include <memory>
-#include <mutex>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -40,73 +35,69 @@ inline std::vector<std::string> model_names() { return {"exact", "willett", "wil
 /// False, and `model` as it was, for a name that is none of model_names().
 inline bool model_from_name(const char* name, Model& model) { return name && choose(model_names(), name, model); }
 
-/// Force law of one model and one contact angle. Immutable; copies share the tables, so that it may be read from many threads.
+/// Evaluates the force law of one model and one contact angle: a plain value that may be copied to a device. BridgeLaw (bridge_law.hpp)
+/// makes it and owns what `tables` points to.
 class BridgeForce {
  public:
-  /// `contact_angle` in rad, 0...pi/2, the mean of the two surfaces; std::invalid_argument otherwise. `exact` solves for its first table.
-  BridgeForce(Model model, double contact_angle) : model_(model), theta_(contact_angle) {
-    if (!(contact_angle >= 0.0 && contact_angle <= 0.5 * detail::pi * (1.0 + 1e-12))) {
-      char line[128];
-      std::snprintf(line, sizeof line, "contact angle %g rad: it must lie in 0...pi/2 (1.5708)", contact_angle);
-      throw std::invalid_argument(line);
-    }
-    sine_ = std::sin(contact_angle);
-    cosine_ = std::max(std::cos(contact_angle), 0.0);
-    if (model == Model::exact) exact_ = std::make_shared<const ExactBridge>(contact_angle);
-    if (model == Model::willett_full) regression_ = WillettRegression(contact_angle);
-    if (model == Model::bagheri) fit_ = BagheriFit(contact_angle);
-  }
+  ExactTables tables{};  ///< of the exact model
 
-  Model model() const { return model_; }
-  double contact_angle() const { return theta_; }
+  DEMBARK_FUNCTION Model model() const { return model_; }
+  DEMBARK_FUNCTION double contact_angle() const { return theta_; }
 
   /// Gap (m) beyond which there is no bridge of `volume` (m^3) between spheres of `radius_1` and `radius_2` (m; infinite = a wall).
-  double rupture_distance(double radius_1, double radius_2, double volume) const {
+  DEMBARK_FUNCTION double rupture_distance(double radius_1, double radius_2, double volume) const {
     const PairSize pair(radius_1, radius_2);
     const double v = pair.reduced(volume);
     return usable(v) ? pair.radius * reduced_rupture(v, pair.asymmetry) : 0.0;
   }
 
   /// Force (N) at `gap` (m; <= 0 counts as touching) for `volume` (m^3) and `surface_tension` (N/m); 0 beyond rupture and without liquid.
-  double force(double radius_1, double radius_2, double gap, double volume, double surface_tension) const {
+  DEMBARK_FUNCTION double force(double radius_1, double radius_2, double gap, double volume, double surface_tension) const {
     const PairSize pair(radius_1, radius_2);
     const double v = pair.reduced(volume);
     if (!usable(v)) return 0.0;
     const double scale = surface_tension * pair.radius, s = gap > 0.0 ? gap * pair.inverse : 0.0;
     if (model_ != Model::exact) return scale * reduced_closed_form(s, v);
-    return scale * (gap > 0.0 ? exact_->force(s, v, pair.asymmetry) : exact_->touching_force(v, pair.asymmetry));
+    return scale * (gap > 0.0 ? tables.force(s, v, pair.asymmetry) : tables.touching_force(v, pair.asymmetry));
+  }
+
+ protected:
+  /// Of an angle of 0...pi/2 (rad), without tables.
+  BridgeForce(Model model, double contact_angle)
+      : model_(model), theta_(contact_angle), sine_(std::sin(contact_angle)), cosine_(std::max(std::cos(contact_angle), 0.0)) {
+    if (model == Model::willett_full) regression_ = WillettRegression(contact_angle);
+    if (model == Model::bagheri) fit_ = BagheriFit(contact_angle);
   }
 
  private:
   struct PairSize {
     double inverse, radius, asymmetry;  // 1/R, R = 2 R*, |R2 - R1| / (R1 + R2)
-    PairSize(double radius_1, double radius_2) {
+    DEMBARK_FUNCTION PairSize(double radius_1, double radius_2) {
       const double curvature_1 = 1.0 / radius_1, curvature_2 = 1.0 / radius_2;
       inverse = 0.5 * (curvature_1 + curvature_2);
       radius = 1.0 / inverse;
       asymmetry = 0.5 * std::fabs(curvature_1 - curvature_2) * radius;
     }
-    double reduced(double volume) const { return volume * (inverse * inverse * inverse); }
+    DEMBARK_FUNCTION double reduced(double volume) const { return volume * (inverse * inverse * inverse); }
   };
   // No liquid, or numbers that overflow or are none.
-  static bool usable(double v) { return v > 0.0 && v < 1e30; }
+  DEMBARK_FUNCTION static bool usable(double v) { return v > 0.0 && v < 1e30; }
 
   Model model_;
-  double theta_, sine_ = 0.0, cosine_ = 1.0;
-  std::shared_ptr<const ExactBridge> exact_;
+  double theta_, sine_, cosine_;
   WillettRegression regression_;
   BagheriFit fit_;
 
-  double reduced_rupture(double v, double asymmetry = 0.0) const {
+  DEMBARK_FUNCTION double reduced_rupture(double v, double asymmetry = 0.0) const {
     switch (model_) {
-      case Model::exact: return exact_->rupture(v, asymmetry);
+      case Model::exact: return tables.rupture(v, asymmetry);
       case Model::rabinovich:
       case Model::constant: return lian_rupture(v, theta_);
       default: return willett_rupture(v, theta_);
     }
   }
 
-  double reduced_closed_form(double gap, double v) const {
+  DEMBARK_FUNCTION double reduced_closed_form(double gap, double v) const {
     if (gap > 0.0 && gap > reduced_rupture(v)) return 0.0;
     switch (model_) {
       case Model::willett: return willett_force(gap, v, cosine_);
@@ -117,16 +108,5 @@ class BridgeForce {
     }
   }
 };
-
-/// The law of one model and contact angle (rad), built once for all that ask for it; it stays until the program ends. Safe from many
-/// threads.
-inline const BridgeForce& shared_bridge_force(Model model, double contact_angle) {
-  static std::mutex guard;
-  static std::deque<BridgeForce> built;
-  const std::lock_guard<std::mutex> lock(guard);
-  for (const BridgeForce& force : built)
-    if (force.model() == model && force.contact_angle() == contact_angle) return force;
-  return built.emplace_back(model, contact_angle);
-}
 
 }  // namespace dembark::capillary

@@ -1,59 +1,17 @@
-// The solved bridges that the tables of bridge_table.hpp are made of: for each node of the volume those from rupture to touching.
-//
-// In v = V/R^3 a cell is an octave, so that its number is the exponent of the floating-point number; within it the coordinate mu, a
-// polynomial in m, of the mantissa 1 + m stands in for log2(1 + m).
+// Solved bridges for the tables of bridge_table.hpp: for each node of the volume those from rupture to touching. Host only.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
-#include <cstring>
 #include <stdexcept>
 #include <vector>
 
 #include "bridge_solver.hpp"
+#include "bridge_table.hpp"
 
 namespace dembark::capillary::detail {
-
-constexpr int first_octave = -30;  ///< v >= 2^-30, about 9.3e-10
-constexpr int octaves = 30;        ///< v <= 1
-
-using Cubic = std::array<double, 4>;
-
-inline double cubic(const Cubic& c, double x) { return (c[0] + c[1] * x) + (c[2] + c[3] * x) * (x * x); }
-
-// Near log2(1 + m), 0 and 1 at the ends, and chosen so that v^(-1/3), which 1/s_r nearly is, is a cubic in it to 5e-7: an error e of
-// s_r shows as sqrt(e) in the force at rupture.
-inline double octave_coordinate(double m) { return m * ((1.550526 - 0.762722 * m) + (m * m) * (0.252754 - 0.040558 * m)); }
-
-// Octave and coordinate in it. Above the table v is held; below it lengths go on as v^(1/3) and the fall as v^(1/2), the limits of
-// a vanishing bridge.
-struct Place {
-  int octave;
-  double mu, shrink = 1.0, steepen = 1.0;
-  explicit Place(double v) {
-    std::uint64_t bits;
-    std::memcpy(&bits, &v, sizeof bits);
-    octave = static_cast<int>(bits >> 52) - 1023 - first_octave;
-    if (static_cast<unsigned>(octave) < static_cast<unsigned>(octaves)) {
-      bits = (bits & 0x000fffffffffffffULL) | 0x3ff0000000000000ULL;
-      double mantissa;
-      std::memcpy(&mantissa, &bits, sizeof mantissa);
-      const double m = mantissa - 1.0;
-      mu = octave_coordinate(m);
-    } else if (octave >= octaves) {
-      octave = octaves - 1;
-      mu = 1.0;
-    } else {
-      octave = 0;
-      mu = 0.0;
-      const double ratio = v / std::ldexp(1.0, first_octave);
-      shrink = std::cbrt(ratio);
-      steepen = 1.0 / std::sqrt(ratio);
-    }
-  }
-};
 
 /// Volume of a node; each octave has four, at mu = 0, 1/3, 2/3, 1, the last being the first of the next.
 inline double node_volume(int node) {

@@ -8,18 +8,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../vec3.hpp"  // DEMBARK_FUNCTION
+
 namespace dembark::capillary {
 
 /// (1 + theta/2) v^(1/3). Lian, Thornton & Adams, J. Colloid Interface Sci. 161 (1993) 138.
 template <class Real>
-inline Real lian_rupture(Real v, Real theta) {
+DEMBARK_FUNCTION inline Real lian_rupture(Real v, Real theta) {
   using std::cbrt;
   return (Real(1) + Real(0.5) * theta) * cbrt(v);
 }
 
 /// (1 + theta/2) (v^(1/3) + v^(2/3)/10). Willett et al., Langmuir 16 (2000) 9396.
 template <class Real>
-inline Real willett_rupture(Real v, Real theta) {
+DEMBARK_FUNCTION inline Real willett_rupture(Real v, Real theta) {
   using std::cbrt;
   const Real c = cbrt(v);
   return (Real(1) + Real(0.5) * theta) * (c + Real(0.1) * c * c);
@@ -27,7 +29,7 @@ inline Real willett_rupture(Real v, Real theta) {
 
 /// Willett's closed form: 2 pi cos(theta) / (1 + 1.05 S + 2.5 S^2), S = s / sqrt(v).
 template <class Real>
-inline Real willett_force(Real gap, Real v, Real cosine) {
+DEMBARK_FUNCTION inline Real willett_force(Real gap, Real v, Real cosine) {
   using std::sqrt;
   const Real scaled = gap / sqrt(v);
   return Real(6.283185307179586477) * cosine / (Real(1) + scaled * (Real(1.05) + Real(2.5) * scaled));
@@ -36,7 +38,7 @@ inline Real willett_force(Real gap, Real v, Real cosine) {
 /// Rabinovich, Esayanur & Moudgil, Langmuir 21 (2005) 10992, eqs. 19-20: 2 pi [cos(theta) / (1 + s/(2 d)) + sin(alpha) sin(alpha + theta)].
 /// Their d = (s/2)(sqrt(1 + 2 v/(pi s^2)) - 1) is written as 2 d = A / (s + sqrt(s^2 + A)), A = 2 v/pi, which is regular at s = 0.
 template <class Real>
-inline Real rabinovich_force(Real gap, Real v, Real sine, Real cosine) {
+DEMBARK_FUNCTION inline Real rabinovich_force(Real gap, Real v, Real sine, Real cosine) {
   using std::cos;
   using std::sin;
   using std::sqrt;
@@ -62,7 +64,7 @@ class WillettRegression {
     set(f4_, -0.010703 + 0.073776 * t - 0.34742 * t2, 0.03345 + 0.04543 * t - 0.09056 * t2, 0.0018574 + 0.004456 * t - 0.006257 * t2, 0.0);
   }
 
-  double force(double gap, double v) const {
+  DEMBARK_FUNCTION double force(double gap, double v) const {
     const double l = std::log(std::clamp(v, 1e-6, 0.1));
     const double f1 = at(f1_, l);
     if (!(gap > 0.0)) return 6.283185307179586477 * std::exp(f1);
@@ -78,7 +80,7 @@ class WillettRegression {
   double f1_[4] = {}, f2_[4] = {}, f3_[4] = {}, f4_[4] = {};
 
   static void set(double (&f)[4], double a, double b, double c, double d) { f[0] = a, f[1] = b, f[2] = c, f[3] = d; }
-  static double at(const double (&f)[4], double l) { return f[0] + l * (f[1] + l * (f[2] + l * f[3])); }
+  DEMBARK_FUNCTION static double at(const double (&f)[4], double l) { return f[0] + l * (f[1] + l * (f[2] + l * f[3])); }
 };
 
 /// Bagheri, Roy & Poeschel (2024), arXiv:2310.11485.
@@ -87,7 +89,7 @@ class BagheriFit {
   BagheriFit() = default;
   explicit BagheriFit(double theta) : theta_(theta), sine_(std::sin(theta)) {}
 
-  double force(double gap, double v) const {
+  DEMBARK_FUNCTION double force(double gap, double v) const {
     const double s = gap / willett_rupture(v, theta_);
     const double l = std::log(std::clamp(v, 1e-9, 1.0));
     const auto power = [l](double n) { return std::exp(n * l); };

@@ -18,6 +18,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../vec3.hpp"  // DEMBARK_FUNCTION
+
 namespace dembark::capillary {
 
 namespace detail {
@@ -28,7 +30,7 @@ struct ViscousLiquid {
   double viscosity = 0.0;    ///< Pa s; 0 = no viscous force
   double minimum_gap = 0.0;  ///< m, > 0 with a viscosity: the gap is never taken smaller
 
-  bool on() const { return viscosity > 0.0; }
+  DEMBARK_FUNCTION bool on() const { return viscosity > 0.0; }
 
   /// What is wrong, or null. Engines put the names of their own parameters before it.
   const char* error() const {
@@ -48,7 +50,7 @@ struct ViscousResistance {
 
 /// Resistance of a bridge of `volume` (m^3) at `gap` (m; <= 0 counts as touching) between spheres of `radius` R (m); none without liquid.
 template <class Real>
-inline ViscousResistance<Real> viscous_resistance(const ViscousLiquid& liquid, Real radius, Real gap, Real volume) {
+DEMBARK_FUNCTION inline ViscousResistance<Real> viscous_resistance(const ViscousLiquid& liquid, Real radius, Real gap, Real volume) {
   using std::log;
   using std::sqrt;
   if (!liquid.on() || !(volume > Real(0))) return {};
@@ -62,7 +64,7 @@ inline ViscousResistance<Real> viscous_resistance(const ViscousLiquid& liquid, R
 
 /// Largest time step (s) of an explicit integration of a pair of `effective_mass` (kg): beyond it the normal force at the smallest gap
 /// would turn the motion round within a step, and feed it.
-inline double viscous_time_step(const ViscousLiquid& liquid, double radius, double effective_mass) {
+DEMBARK_FUNCTION inline double viscous_time_step(const ViscousLiquid& liquid, double radius, double effective_mass) {
   return effective_mass * liquid.minimum_gap / (0.5 * detail::three_pi * liquid.viscosity * radius * radius);
 }
 

@@ -3,6 +3,7 @@
 #include <random>
 #include "catch.hpp"
 
+#include "dembark/capillary/bridge_law.hpp"
 #include "dembark/contact_energy.hpp"
 
 using namespace dembark;
@@ -11,7 +12,7 @@ using Catch::WithinRel;
 
 namespace {
 
-const capillary::BridgeForce bridge(capillary::Model::willett, 0.35);
+const capillary::BridgeLaw bridge(capillary::Model::willett, 0.35);
 
 /// Sums over an oblique impact of two spheres by leapfrog.
 struct Account {

@@ -2,6 +2,7 @@
 #include <cmath>
 #include "catch.hpp"
 
+#include "dembark/capillary/bridge_law.hpp"
 #include "dembark/contact.hpp"
 
 using namespace dembark;
@@ -82,7 +83,7 @@ TEST_CASE("a contact that parts faster than its spring pushes still has friction
 }
 
 TEST_CASE("a bridge pulls the surfaces together and takes nothing from what limits friction") {
-  static const capillary::BridgeForce bridge(capillary::Model::willett, 0.3);
+  static const capillary::BridgeLaw bridge(capillary::Model::willett, 0.3);
   for (const FrictionLimit limit : {FrictionLimit::total, FrictionLimit::elastic}) {
     ContactParameters wet = parameters(limit), dry = wet;
     wet.liquid = {&bridge, 0.072, 1e-11, {}};

@@ -4,6 +4,7 @@
 #include <vector>
 #include "catch.hpp"
 
+#include "dembark/capillary/bridge_law.hpp"
 #include "dembark/contact.hpp"
 #include "dembark/contact_history.hpp"
 #include "dembark/pairs/pair_step.hpp"
@@ -14,7 +15,7 @@ using namespace dembark;
 
 namespace {
 
-const capillary::BridgeForce bridge{capillary::Model::willett, 0.3};
+const capillary::BridgeLaw bridge{capillary::Model::willett, 0.3};
 
 /// Grains, and a list with each pair once; the laws of rare contacts as adapters have them.
 struct Scene : ScalarLaws, ScalarMemory {

@@ -6,6 +6,7 @@
 #include <random>
 #include <string>
 
+#include "dembark/capillary/bridge_law.hpp"
 #include "dembark/contact.hpp"
 
 using namespace dembark;
@@ -103,7 +104,7 @@ TEST_CASE("the time step limit is that of the normal force at the floor", "[visc
 }
 
 TEST_CASE("the liquid takes energy from any motion, and no angular momentum", "[viscous]") {
-  const BridgeForce bridge(Model::constant, 0.3);
+  const BridgeLaw bridge(Model::constant, 0.3);
   ContactParameters p;
   p.elasticity = {1e7, 4e6, 0.8};
   p.liquid = {&bridge, 0.0, volume, oil};
@@ -147,7 +148,7 @@ TEST_CASE("the liquid takes energy from any motion, and no angular momentum", "[
 }
 
 TEST_CASE("there is no viscous force without a bridge", "[viscous]") {
-  const BridgeForce bridge(Model::constant, 0.3);
+  const BridgeLaw bridge(Model::constant, 0.3);
   ContactParameters p;
   p.elasticity = {1e7, 4e6, 0.8};
   p.liquid = {&bridge, 0.07, volume, oil};
