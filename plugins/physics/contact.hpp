@@ -43,7 +43,7 @@ struct Liquid {
   capillary::ViscousLiquid viscous{};
 
   /// Largest time step (s) with which a bridge between these bodies can be integrated.
-  double stable_time_step(double effective_radius, double effective_mass) const {
+  DEMBARK_FUNCTION double stable_time_step(double effective_radius, double effective_mass) const {
     return viscous.on() ? capillary::viscous_time_step(viscous, 2.0 * effective_radius, effective_mass) : INFINITY;
   }
 };
@@ -60,14 +60,17 @@ struct ContactParameters {
 
   /// The normal law, as it is without the switches above. Two held bodies, whose effective mass is infinite, have no impact that damping or
   /// Hooke's stiffness could follow from: between them there is Hertz's spring alone.
-  NormalResponse<double> respond(double effective_radius, double effective_mass, double overlap, double normal_velocity) const {
+  DEMBARK_FUNCTION NormalResponse<double> respond(double effective_radius, double effective_mass, double overlap,
+                                                  double normal_velocity) const {
     const bool held = std::isinf(effective_mass);
     if (normal_law == NormalLaw::hertz || held)
       return hertz(elasticity, effective_radius, held ? 0.0 : effective_mass, overlap, normal_velocity);
     return hooke(elasticity, characteristic_velocity, effective_radius, effective_mass, overlap, normal_velocity);
   }
   /// The spring's force grows with this power of the overlap.
-  double spring_exponent(double effective_mass) const { return normal_law == NormalLaw::hertz || std::isinf(effective_mass) ? 1.5 : 1.0; }
+  DEMBARK_FUNCTION double spring_exponent(double effective_mass) const {
+    return normal_law == NormalLaw::hertz || std::isinf(effective_mass) ? 1.5 : 1.0;
+  }
 };
 
 /// What an engine stores per contact, from touching to the end of contact and bridge.
@@ -89,10 +92,10 @@ struct ContactBodies {
   double mass_1 = 0.0, mass_2 = INFINITY;
   Vec3<double> wall_spin{};  ///< rad/s, how a wall turns that is body 2
 
-  double effective_radius() const { return reduced(radius_1, radius_2); }
-  double effective_mass() const { return reduced(mass_1, mass_2); }
-  Vec3<double> spin_2() const { return angular_velocity_2 + wall_spin; }
-  Vec3<double> relative_spin() const { return angular_velocity_1 - spin_2(); }
+  DEMBARK_FUNCTION double effective_radius() const { return reduced(radius_1, radius_2); }
+  DEMBARK_FUNCTION double effective_mass() const { return reduced(mass_1, mass_2); }
+  DEMBARK_FUNCTION Vec3<double> spin_2() const { return angular_velocity_2 + wall_spin; }
+  DEMBARK_FUNCTION Vec3<double> relative_spin() const { return angular_velocity_1 - spin_2(); }
 };
 
 struct ContactForce {
@@ -112,16 +115,16 @@ struct ContactForce {
 
 typedef SurfaceMotion<double> RelativeMotion;
 
-inline RelativeMotion relative_motion(const ContactBodies& b, const Vec3<double>& normal, double overlap) {
+DEMBARK_FUNCTION inline RelativeMotion relative_motion(const ContactBodies& b, const Vec3<double>& normal, double overlap) {
   const double arm_1 = b.radius_1 - 0.5 * overlap, arm_2 = (std::isinf(b.radius_2) ? 0.0 : b.radius_2) - 0.5 * overlap;
   return surface_motion(normal, b.velocity_1 - b.velocity_2, arm_1, b.angular_velocity_1, arm_2, b.spin_2());
 }
 
 /// Friction of touching surfaces (N, on body 1): the spring turns with the pair by `twist` (rad, of contact_twist), then it sticks or
 /// slips. `rings`: for Presliding::partial_slip, else not used.
-inline Vec3<double> contact_friction(const FinnieRabinowicz& law, const Vec3<double>& normal, double twist,
-                                     const NormalResponse<double>& response, const Vec3<double>& velocity, double dt,
-                                     FrictionState<double>& state, SlipRings* rings) {
+DEMBARK_FUNCTION inline Vec3<double> contact_friction(const FinnieRabinowicz& law, const Vec3<double>& normal, double twist,
+                                                      const NormalResponse<double>& response, const Vec3<double>& velocity, double dt,
+                                                      FrictionState<double>& state, SlipRings* rings) {
   const double limiting = response.limiting_force(law.friction_limit == FrictionLimit::elastic);
   if (law.presliding == Presliding::partial_slip)
     return partial_slip_step(law, normal, twist, limiting, response.tangential_stiffness, response.tangential_damping,
@@ -133,8 +136,8 @@ inline Vec3<double> contact_friction(const FinnieRabinowicz& law, const Vec3<dou
 
 /// Attraction (N) of the bridge between spheres of these radii (m; infinite = a wall): it forms at the touch, holds on over the gap (m, < 0
 /// = overlap) and ruptures beyond its distance. `volume` (m^3, 0 = no bridge) and `rupture_distance` (m) are its state.
-inline double bridge_step(const Liquid& liquid, double radius_1, double radius_2, double gap, bool touching, double& volume,
-                          double& rupture_distance) {
+DEMBARK_FUNCTION inline double bridge_step(const Liquid& liquid, double radius_1, double radius_2, double gap, bool touching,
+                                           double& volume, double& rupture_distance) {
   if (!(volume > 0.0)) {
     if (!touching || !liquid.force || !(liquid.bridge_volume > 0.0)) return 0.0;
     volume = liquid.bridge_volume;
@@ -146,15 +149,15 @@ inline double bridge_step(const Liquid& liquid, double radius_1, double radius_2
 }
 
 /// What the liquid of a bridge of `volume` (m^3) resists with, into `out`.
-inline void bridge_resistance(const Liquid& liquid, const ContactBodies& b, double volume, const RelativeMotion& motion,
-                              ContactForce& out) {
+DEMBARK_FUNCTION inline void bridge_resistance(const Liquid& liquid, const ContactBodies& b, double volume, const RelativeMotion& motion,
+                                               ContactForce& out) {
   const auto resistance = capillary::viscous_resistance(liquid.viscous, 2.0 * b.effective_radius(), -out.overlap, volume);
   out.viscous_normal = -resistance.normal * motion.normal_velocity;
   out.viscous_tangential = -resistance.tangential * motion.tangential_velocity;
 }
 
 /// Forces along the surface turn the bodies, those along the normal do not.
-inline void assemble(const RelativeMotion& motion, ContactForce& out) {
+DEMBARK_FUNCTION inline void assemble(const RelativeMotion& motion, ContactForce& out) {
   const Vec3<double> along_surface = out.tangential + out.viscous_tangential, moment = cross(out.normal, along_surface);
   out.torque_1 = -motion.arm_1 * moment;
   out.torque_2 = -motion.arm_2 * moment;
@@ -162,7 +165,7 @@ inline void assemble(const RelativeMotion& motion, ContactForce& out) {
 }
 
 /// The couple of rolling resistance, into what is assembled.
-inline void add_couple(const Vec3<double>& couple, ContactForce& out) {
+DEMBARK_FUNCTION inline void add_couple(const Vec3<double>& couple, ContactForce& out) {
   out.rolling = couple;
   out.torque_1 += couple;
   out.torque_2 -= couple;
@@ -170,7 +173,7 @@ inline void add_couple(const Vec3<double>& couple, ContactForce& out) {
 
 /// One step of one contact. `dt` in s. Coincident centres, and a centre on a wall, have no normal: it and the force are no numbers, and an
 /// engine ends its run.
-inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& state) {
+DEMBARK_FUNCTION inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& state) {
   ContactForce out;
   const double distance = norm(b.separation);
   out.overlap = b.radius_1 + (std::isinf(b.radius_2) ? 0.0 : b.radius_2) - distance;
@@ -210,7 +213,8 @@ inline ContactForce contact_step(const ContactParameters& p, const ContactBodies
 }
 
 /// With `update` false (the set-up of a run) forces are those of the present state, which stays as it is.
-inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& state, bool update) {
+DEMBARK_FUNCTION inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& state,
+                                                  bool update) {
   if (update) return contact_step(p, b, dt, state);
   ContactState scratch = state;
   return contact_step(p, b, 0.0, scratch);

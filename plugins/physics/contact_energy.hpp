@@ -22,7 +22,9 @@ namespace dembark {
 /// Of a body along x, y, z and about them: velocities and spins, forces and torques, masses and moments of inertia.
 typedef std::array<double, 6> Dofs;
 
-inline Dofs dofs(const Vec3<double>& along, const Vec3<double>& about) { return {along.x, along.y, along.z, about.x, about.y, about.z}; }
+DEMBARK_FUNCTION inline Dofs dofs(const Vec3<double>& along, const Vec3<double>& about) {
+  return {along.x, along.y, along.z, about.x, about.y, about.z};
+}
 
 DEMBARK_HOT double dot(const Dofs& a, const Dofs& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5];
@@ -61,8 +63,8 @@ struct ContactParts {
   double tangential_stored = 0.0;        ///< J, k_t xi^2 / 2
   double rolling_stored = 0.0;           ///< J, k_r theta^2 / 2
 
-  Vec3<double>& operator[](ContactPart part) { return load[static_cast<std::size_t>(part)]; }
-  const Vec3<double>& operator[](ContactPart part) const { return load[static_cast<std::size_t>(part)]; }
+  DEMBARK_FUNCTION Vec3<double>& operator[](ContactPart part) { return load[static_cast<std::size_t>(part)]; }
+  DEMBARK_FUNCTION const Vec3<double>& operator[](ContactPart part) const { return load[static_cast<std::size_t>(part)]; }
 };
 
 /// Where the force of a contact acts: lever arms (m) from the positions of its bodies.
@@ -70,15 +72,20 @@ struct ContactLevers {
   Vec3<double> one{}, two{};
 
   ContactLevers() = default;
-  ContactLevers(const Vec3<double>& normal, const RelativeMotion& motion) : one(-motion.arm_1 * normal), two(motion.arm_2 * normal) {}
+  DEMBARK_FUNCTION ContactLevers(const Vec3<double>& normal, const RelativeMotion& motion)
+      : one(-motion.arm_1 * normal), two(motion.arm_2 * normal) {}
   /// Forces and torques on bodies 1 and 2 by this force on body 1.
-  Dofs on_one(const Vec3<double>& force) const { return dofs(force, cross(one, force)); }
-  Dofs on_two(const Vec3<double>& force) const { return dofs(-force, cross(force, two)); }
+  DEMBARK_FUNCTION Dofs on_one(const Vec3<double>& force) const { return dofs(force, cross(one, force)); }
+  DEMBARK_FUNCTION Dofs on_two(const Vec3<double>& force) const { return dofs(-force, cross(force, two)); }
   /// The same by a part, force or couple.
-  Dofs on_one(std::size_t part, const Vec3<double>& load) const { return part < force_part_count ? on_one(load) : dofs({}, load); }
-  Dofs on_two(std::size_t part, const Vec3<double>& load) const { return part < force_part_count ? on_two(load) : dofs({}, -load); }
+  DEMBARK_FUNCTION Dofs on_one(std::size_t part, const Vec3<double>& load) const {
+    return part < force_part_count ? on_one(load) : dofs({}, load);
+  }
+  DEMBARK_FUNCTION Dofs on_two(std::size_t part, const Vec3<double>& load) const {
+    return part < force_part_count ? on_two(load) : dofs({}, -load);
+  }
   /// m/s, of body 1 against body 2.
-  Vec3<double> velocity(const Dofs& v, const Dofs& w) const {
+  DEMBARK_FUNCTION Vec3<double> velocity(const Dofs& v, const Dofs& w) const {
     return Vec3<double>{v[0] - w[0], v[1] - w[1], v[2] - w[2]} + cross({v[3], v[4], v[5]}, one) - cross({w[3], w[4], w[5]}, two);
   }
 };
@@ -86,9 +93,9 @@ struct ContactLevers {
 /// Springs and dash-pots of a touching contact. `spring`: N, what the normal law gives at rest, which grows with overlap^exponent;
 /// `normal_force`: N, what it gave; `stiffness`: k_t; `tangential`: N, on body 1; `displacement`: xi after the step, of `rings` where the
 /// contact slips in parts.
-inline void split_touching(ContactParts& parts, const Vec3<double>& normal, double overlap, double spring, double exponent,
-                           double normal_force, double stiffness, const Vec3<double>& tangential, const Vec3<double>& displacement,
-                           const SlipRings* rings) {
+DEMBARK_FUNCTION inline void split_touching(ContactParts& parts, const Vec3<double>& normal, double overlap, double spring, double exponent,
+                                            double normal_force, double stiffness, const Vec3<double>& tangential,
+                                            const Vec3<double>& displacement, const SlipRings* rings) {
   const Vec3<double> held = -stiffness * displacement;
   parts[ContactPart::normal_elastic] = spring * normal;
   parts[ContactPart::normal_viscous] = (normal_force - spring) * normal;
@@ -99,7 +106,7 @@ inline void split_touching(ContactParts& parts, const Vec3<double>& normal, doub
 }
 
 /// Spring and dashpot of rolling resistance. `couple`: N m, on body 1; `angle`: theta after the step; `stiffness`: k_r.
-inline void split_rolling(ContactParts& parts, const Vec3<double>& couple, const Vec3<double>& angle, double stiffness) {
+DEMBARK_FUNCTION inline void split_rolling(ContactParts& parts, const Vec3<double>& couple, const Vec3<double>& angle, double stiffness) {
   const Vec3<double> held = -stiffness * angle;
   parts.count = contact_part_count;
   parts[ContactPart::rolling_elastic] = held;
@@ -108,14 +115,14 @@ inline void split_rolling(ContactParts& parts, const Vec3<double>& couple, const
 }
 
 /// What the liquid of a bridge does.
-inline void split_bridge(ContactParts& parts, const ContactForce& force) {
+DEMBARK_FUNCTION inline void split_bridge(ContactParts& parts, const ContactForce& force) {
   parts[ContactPart::capillary] = -force.capillary_force * force.normal;
   parts[ContactPart::liquid_viscous] = force.viscous_normal * force.normal + force.viscous_tangential;
 }
 
 /// The parts of `force`, which `contact_step` has returned when it left `state`. Of the bodies only radii and masses count.
-inline ContactParts contact_parts(const ContactParameters& p, const ContactBodies& bodies, const ContactForce& force,
-                                  const ContactState& state) {
+DEMBARK_FUNCTION inline ContactParts contact_parts(const ContactParameters& p, const ContactBodies& bodies, const ContactForce& force,
+                                                   const ContactState& state) {
   ContactParts parts;
   split_bridge(parts, force);
   if (!(force.overlap > 0.0)) return parts;

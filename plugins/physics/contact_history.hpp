@@ -9,22 +9,22 @@ namespace dembark {
 
 /// Friction: five numbers.
 static_assert(sizeof(FrictionState<double>) == 5 * sizeof(double));
-inline FrictionState<double> load_friction(const double* row) {
+DEMBARK_FUNCTION inline FrictionState<double> load_friction(const double* row) {
   FrictionState<double> state;
   std::memcpy(static_cast<void*>(&state), row, sizeof state);
   return state;
 }
-inline void store_friction(double* row, const FrictionState<double>& state) { std::memcpy(row, &state, sizeof state); }
+DEMBARK_FUNCTION inline void store_friction(double* row, const FrictionState<double>& state) { std::memcpy(row, &state, sizeof state); }
 
 /// Partial slip. When the two bodies of a contact are swapped, displacements along the axis, which stand first, change their sign. Those
 /// across it do not: with the normal, the direction across turns over.
 constexpr int ring_numbers = sizeof(SlipRings) / sizeof(double);
-inline SlipRings load_rings(const double* row) {
+DEMBARK_FUNCTION inline SlipRings load_rings(const double* row) {
   SlipRings rings;
   std::memcpy(static_cast<void*>(&rings), row, sizeof rings);
   return rings;
 }
-inline void store_rings(double* row, const SlipRings& rings) { std::memcpy(row, &rings, sizeof rings); }
+DEMBARK_FUNCTION inline void store_rings(double* row, const SlipRings& rings) { std::memcpy(row, &rings, sizeof rings); }
 
 /// Which parts of a ContactState stand in a row, one after the other: friction always, then those that are switched on.
 struct HistoryLayout {
@@ -32,13 +32,13 @@ struct HistoryLayout {
   bool imbalance = false;  ///< of carried liquid (capillary/liquid.hpp), which load() and store() leave alone
 
   /// Another number for each layout.
-  int code() const { return bridge + 2 * rings + 4 * rolling + 8 * imbalance; }
+  DEMBARK_FUNCTION int code() const { return bridge + 2 * rings + 4 * rolling + 8 * imbalance; }
 
-  int bridge_at() const { return 5; }
-  int rings_at() const { return bridge_at() + (bridge ? 2 : 0); }
-  int rolling_at() const { return rings_at() + (rings ? ring_numbers : 0); }
-  int imbalance_at() const { return rolling_at() + (rolling ? 3 : 0); }
-  int size() const { return imbalance_at() + (imbalance ? 1 : 0); }
+  DEMBARK_FUNCTION int bridge_at() const { return 5; }
+  DEMBARK_FUNCTION int rings_at() const { return bridge_at() + (bridge ? 2 : 0); }
+  DEMBARK_FUNCTION int rolling_at() const { return rings_at() + (rings ? ring_numbers : 0); }
+  DEMBARK_FUNCTION int imbalance_at() const { return rolling_at() + (rolling ? 3 : 0); }
+  DEMBARK_FUNCTION int size() const { return imbalance_at() + (imbalance ? 1 : 0); }
 
   /// `state` must be a new one where its other parts are asked for.
   DEMBARK_HOT void load(const double* row, ContactState& state) const {
@@ -62,7 +62,7 @@ struct HistoryLayout {
   }
 
   /// The same contact with its bodies swapped.
-  void swap_bodies(const double* row, double* swapped) const {
+  DEMBARK_FUNCTION void swap_bodies(const double* row, double* swapped) const {
     std::memcpy(swapped, row, std::size_t(size()) * sizeof *row);
     const auto turn = [swapped](int first, int count) {
       for (int k = first; k < first + count; ++k) swapped[k] = -swapped[k];
