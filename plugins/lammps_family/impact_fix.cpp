@@ -108,13 +108,13 @@ void ImpactFix::do_step(double dt, const std::function<void()>& work) {
     take_walls(dt);
     impacts_->take(all_body_, box());
     work();
-    impacts_->hand_out(all_push_);
+    impacts_->hand_out(all_wrench_);
   });
-  own_push_.resize(own_atom_.size());
-  ranks_.scatter(all_push_, own_push_);
+  own_wrench_.resize(own_atom_.size());
+  ranks_.scatter(all_wrench_, own_wrench_);
   for (std::size_t k = 0; k < own_atom_.size(); ++k) {
-    add(atom->f[own_atom_[k]], own_push_[k].force);
-    add(atom->torque[own_atom_[k]], own_push_[k].torque, 1.0 / torque_scale_);
+    add(atom->f[own_atom_[k]], own_wrench_[k].force);
+    add(atom->torque[own_atom_[k]], own_wrench_[k].torque, 1.0 / torque_scale_);
   }
 }
 

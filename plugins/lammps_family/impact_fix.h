@@ -56,7 +56,7 @@ class ImpactFix : public SharedFix {
 
   std::vector<int> own_atom_;  // of each own body, in the order in which they are gathered
   std::vector<dembark::impact::Body> own_body_, all_body_;
-  std::vector<dembark::impact::Push> own_push_, all_push_;
+  std::vector<dembark::impact::ContactWrench> own_wrench_, all_wrench_;
   double torque_scale_ = 1.0;  // the engine turns atoms with an inertia of its own
   int local_capacity_ = 1;
 };

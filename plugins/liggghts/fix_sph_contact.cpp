@@ -110,7 +110,7 @@ void FixSphContact::post_force(int) { push(true); }
 
 /// All ranks have the places of all bodies, and do the same.
 void FixSphContact::push(bool remember) {
-  const std::vector<Push> &pushes = contacts_.push(remember ? update->dt : 0.0, bodies_, remember);
+  const std::vector<ContactWrench> &wrenches = contacts_.push(remember ? update->dt : 0.0, bodies_, remember);
   // Twice as deep, two edges have passed each other, and their springs push on.
   if (!remember && contacts_.deepest > contacts_.radius)
     fail("boxes overlap by " + text(contacts_.deepest) + " m, more than the rounding, " + text(contacts_.radius) +
@@ -118,7 +118,7 @@ void FixSphContact::push(bool remember) {
   if (contacts_.deepest > contacts_.radius)
     fail("at step " + std::to_string(update->ntimestep) + " boxes overlap by " + text(contacts_.deepest) + " m, more than the rounding, " +
          text(contacts_.radius) + " m; take a higher stiffness");
-  for (std::size_t k = 0; k < fixes_.size(); ++k) fixes_[k]->add_load(pushes[k].force, pushes[k].torque);
+  for (std::size_t k = 0; k < fixes_.size(); ++k) fixes_[k]->add_load(wrenches[k].force, wrenches[k].torque);
   if (slit_pressure_ > 0.0) films_.push(slit_pressure_);
 }
 

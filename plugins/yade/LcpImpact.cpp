@@ -257,8 +257,8 @@ void LcpImpact::action() {
 	}
 	if (first) moveBack();
 	for (std::size_t i = 0; i < logs.size(); ++i) {
-		scene->forces.addForce(static_cast<Body::id_t>(logs[i].id), eigen(system->pushes()[i].force));
-		scene->forces.addTorque(static_cast<Body::id_t>(logs[i].id), eigen(system->pushes()[i].torque));
+		scene->forces.addForce(static_cast<Body::id_t>(logs[i].id), eigen(system->wrenches()[i].force));
+		scene->forces.addTorque(static_cast<Body::id_t>(logs[i].id), eigen(system->wrenches()[i].torque));
 	}
 	pushWalls();
 	writeImpacts();
@@ -271,8 +271,8 @@ void LcpImpact::moveBack() const {
 	for (std::size_t i = 0; i < logs.size(); ++i) {
 		if (std::isinf(logs[i].mass)) continue;
 		State&         state = *Body::byId(static_cast<Body::id_t>(logs[i].id), scene)->state;
-		const Vector3r f     = eigen(logs[i].force) + eigen(system->pushes()[i].force);
-		const Vector3r t     = eigen(logs[i].torque) + eigen(system->pushes()[i].torque);
+		const Vector3r f     = eigen(logs[i].force) + eigen(system->wrenches()[i].force);
+		const Vector3r t     = eigen(logs[i].torque) + eigen(system->wrenches()[i].torque);
 		for (int k = 0; k < 3; ++k) {
 			if (!(state.blockedDOFs & State::axisDOF(k))) state.vel[k] -= 0.5 * scene->dt * f[k] / state.mass;
 			if (!(state.blockedDOFs & State::axisDOF(k, true))) state.angVel[k] -= 0.5 * scene->dt * t[k] / state.inertia[k];

@@ -117,7 +117,7 @@ private:
 	std::string                 wallName(std::size_t number) const;
 
 	std::unique_ptr<::dembark::impact::System> system;
-	::dembark::impact::Surroundings            around;
+	::dembark::impact::ContactGeometry         around;
 	::dembark::impact::ImpactFile              file;
 	// Of the present step:
 	std::vector<::dembark::impact::Body> logs;        // in the order of their ids; held spheres have infinite mass

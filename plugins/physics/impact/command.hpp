@@ -19,7 +19,7 @@ namespace impact {
 
 struct Command {
   Settings settings;                ///< a material for each atom type, then one for each wall; without the time step
-  Surroundings around;              ///< the walls, numbered in the order in which the words name them
+  ContactGeometry around;           ///< the walls, numbered in the order in which the words name them
   std::vector<std::string> walls;   ///< their names, for messages and the file of impacts
   std::vector<std::string> meshes;  ///< what the engine calls the meshes in `around`
   std::size_t types = 0;
@@ -134,7 +134,7 @@ class CommandReader : keywords::Reader {
     std::vector<std::string>& walls = command_.walls;
     if (std::find(walls.begin(), walls.end(), name) != walls.end())
       refuse(of + ": there is a wall of this name already; give each wall its own");
-    Surroundings& around = command_.around;
+    ContactGeometry& around = command_.around;
     Wall* wall = nullptr;
     if (shape == 0) {
       Plane& plane = around.planes.emplace_back();

@@ -78,20 +78,20 @@ class Coupling {
   /// forces of its step.
   void set_up(std::int64_t now) {
     if (last_step_ != now || !last_.hold(bodies_, command.around.pairs.box)) solve(now, 0.5);
-    else pushes_ = last_.pushes;
+    else wrenches_ = last_.wrenches;
   }
 
   /// The forces, in the order in which the bodies were given.
-  void hand_out(std::vector<Push>& gathered) const {
+  void hand_out(std::vector<ContactWrench>& gathered) const {
     gathered.resize(bodies_.size());
-    for (std::size_t i = 0; i < bodies_.size(); ++i) gathered[order_[i]] = pushes_[i];
+    for (std::size_t i = 0; i < bodies_.size(); ++i) gathered[order_[i]] = wrenches_[i];
   }
 
   /// At the end of a step or of a run: the bodies as the engine has moved them.
   void end_step(const std::vector<Body>& gathered) {
     if (!kept_) {
       last_.keep(bodies_);
-      last_.pushes = pushes_;
+      last_.wrenches = wrenches_;
       kept_ = true;
     }
     take(gathered, command.around.pairs.box);
@@ -114,16 +114,16 @@ class Coupling {
   }
 
   double memory() const {
-    return double(bodies_.size() * (sizeof(Body) + 2 * sizeof(Push)) + std::size_t(report.contacts) * sizeof(Contact));
+    return double(bodies_.size() * (sizeof(Body) + 2 * sizeof(ContactWrench)) + std::size_t(report.contacts) * sizeof(Contact));
   }
 
  private:
   void solve(std::int64_t now, double kick) {
     const double time = clock_time_ + double(now - clock_step_) * last_dt_;
-    Surroundings& around = command.around;
+    ContactGeometry& around = command.around;
     const auto search = [&](double reach, std::vector<Contact>& contacts) { around.find(bodies_, reach, contacts); };
     report = system_.step(bodies_, search, around.wall_speed(), time, kick);
-    pushes_ = system_.pushes();
+    wrenches_ = system_.wrenches();
     file_.append(system_.take_finished());
     results_.clear();
     last_step_ = now;
@@ -155,7 +155,7 @@ class Coupling {
   ImpactFile file_;
   // All bodies by number, as they came and what each of them gets.
   std::vector<Body> bodies_;
-  std::vector<Push> pushes_;
+  std::vector<ContactWrench> wrenches_;
   std::vector<std::size_t> order_;
   std::vector<ContactResult> results_;  ///< of the step of a restart file
   LastForces last_;

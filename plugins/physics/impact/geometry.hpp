@@ -275,7 +275,7 @@ class TriangleFinder {
 };
 
 /// All that bodies may touch: each other and the walls.
-struct Surroundings {
+struct ContactGeometry {
   PairFinder pairs;
   std::vector<Plane> planes;
   std::vector<Drum> drums;

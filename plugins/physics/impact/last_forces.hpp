@@ -16,7 +16,7 @@ namespace impact {
 
 class LastForces {
  public:
-  std::vector<Push> pushes;  ///< of the contacts
+  std::vector<ContactWrench> wrenches;  ///< of the contacts
 
   /// Of a step: its bodies, with the forces of everything else.
   void keep(const std::vector<Body>& bodies) { bodies_ = bodies; }
@@ -50,7 +50,7 @@ class LastForces {
     return std::equal(bodies.begin(), bodies.end(), bodies_.begin(), bodies_.end(), same);
   }
 
-  auto fields() { return std::tie(pushes, bodies_); }
+  auto fields() { return std::tie(wrenches, bodies_); }
 
  private:
   std::vector<Body> bodies_;

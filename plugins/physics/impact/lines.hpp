@@ -33,8 +33,8 @@ class Lines {
     int a, b, row;
   };
 
-  /// What a sweep reads of a row and changes, in the order of visiting: the step leads to z = keep z - q - pull (shift_a - shift_b).
-  struct Visit {
+  /// What a sweep reads of a row and changes, in the order of the sweep: the step leads to z = keep z - q - pull (shift_a - shift_b).
+  struct RelaxationRow {
     Vector pull, on_a, on_b;  ///< the normal over the row's diagonal; response of the bodies, m/N
     double keep, q, z;        ///< share of the bodies in the diagonal; q over it, N; N
     double base;              ///< N, what steps are compared with, but for z
@@ -67,15 +67,15 @@ class Lines {
   }
 
   void store(Eigen::VectorXd& z) const {
-    for (std::size_t i = 0; i < near_; ++i) z[lines_[i].row] = visits_[i].z;
+    for (std::size_t i = 0; i < near_; ++i) z[lines_[i].row] = relaxation_[i].z;
     for (std::size_t i = near_; i < lines_.size(); ++i) z[lines_[i].row] = 0.0;
   }
 
   /// So many lines, the first, may carry a force and are swept over.
   Eigen::Index near() const { return Eigen::Index(near_); }
   double unit(Eigen::Index i) const { return lines_[std::size_t(i)].root; }
-  double force(Eigen::Index i) const { return visits_[std::size_t(i)].z; }
-  void set_force(Eigen::Index i, double z) { visits_[std::size_t(i)].z = z; }
+  double force(Eigen::Index i) const { return relaxation_[std::size_t(i)].z; }
+  void set_force(Eigen::Index i, double z) { relaxation_[std::size_t(i)].z = z; }
   /// What the forces minimise (J), 1/2 z A z + q z; after gather().
   double energy() const {
     double sum = 0.0;
@@ -92,7 +92,7 @@ class Lines {
   void gather() {
     for (Vector& s : shift_) s.setZero();
     for (std::size_t i = 0; i < near_; ++i) {
-      const Visit& v = visits_[i];
+      const RelaxationRow& v = relaxation_[i];
       *v.a += v.z * v.on_a;
       *v.b -= v.z * v.on_b;
     }
@@ -102,8 +102,8 @@ class Lines {
   template <bool Measured>
   double relax() {
     double most = 0.0;
-    const Visit* const end = visits_.data() + near_;
-    for (Visit* v = visits_.data(); v != end; ++v) {
+    const RelaxationRow* const end = relaxation_.data() + near_;
+    for (RelaxationRow* v = relaxation_.data(); v != end; ++v) {
       const double old = v->z, free = v->keep * old - (v->q + v->pull.dot(*v->a - *v->b)), next = free > 0.0 ? free : 0.0;
       const double step = next - old;
       *v->a += step * v->on_a;
@@ -194,7 +194,7 @@ class Lines {
     for (int i = 0; i < int(rows_->size()); ++i) (q[i] < 0.0 || z[i] > 0.0 ? order_ : far_).push_back(i);
     near_ = order_.size();
     lines_.resize(rows_->size());
-    visits_.resize(rows_->size());
+    relaxation_.resize(rows_->size());
     const std::size_t part = (near_ + parts - 1) / parts;
     std::size_t at = 0;
     for (std::size_t i = 0; i < part; ++i)
@@ -218,10 +218,10 @@ class Lines {
     if (i < near_) place(i);
   }
 
-  /// The constant part of a visit.
+  /// The constant part of a relaxation row.
   void place(std::size_t i) {
     const Line& l = lines_[i];
-    Visit& v = visits_[i];
+    RelaxationRow& v = relaxation_[i];
     v.pull = l.inverse * l.normal;
     v.on_a = l.of_a * l.normal;
     v.on_b = l.of_b * l.normal;
@@ -233,7 +233,7 @@ class Lines {
   /// What this solve makes of it; z: where it begins.
   void start(std::size_t i, double z) {
     const Line& l = lines_[i];
-    Visit& v = visits_[i];
+    RelaxationRow& v = relaxation_[i];
     v.q = l.q * l.inverse;
     v.z = z;
     v.base = std::fabs(v.q) + floor_ * l.root;
@@ -248,7 +248,7 @@ class Lines {
   double scale_ = 0.0;
   bool built_ = false;  ///< in this step
   std::vector<Line, Eigen::aligned_allocator<Line>> lines_;
-  std::vector<Visit, Eigen::aligned_allocator<Visit>> visits_;
+  std::vector<RelaxationRow, Eigen::aligned_allocator<RelaxationRow>> relaxation_;
   std::vector<Vector, Eigen::aligned_allocator<Vector>> shift_;
   std::vector<int> order_, far_;
   std::size_t near_ = 0;

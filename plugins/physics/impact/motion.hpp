@@ -44,7 +44,7 @@ class Motion {
  public:
   std::vector<BodyResponse> response;
   std::vector<NormalSum> normal;
-  std::vector<Push> tangential;
+  std::vector<ContactWrench> tangential;
   std::vector<Velocity> change;  ///< v' - v, omega' - omega; see move()
   std::vector<int> damped;       ///< bodies with lambda > 0, in the order of the contacts
 
@@ -54,7 +54,7 @@ class Motion {
     interval_ = kick * dt;
     response.resize(bodies.size());
     normal.assign(bodies.size(), NormalSum());
-    tangential.assign(bodies.size(), Push());
+    tangential.assign(bodies.size(), ContactWrench());
     change.resize(bodies.size());
     moved_.resize(bodies.size());
     acceleration_.resize(bodies.size());
@@ -83,7 +83,7 @@ class Motion {
     normal[r.b].force -= force * r.normal;
     ++normal[r.b].active;
   }
-  void clear_tangential() { std::fill(tangential.begin(), tangential.end(), Push()); }
+  void clear_tangential() { std::fill(tangential.begin(), tangential.end(), ContactWrench()); }
   void add_tangential(const Row& r, const Vec3<double>& t) {
     const Vec3<double> moment = cross(r.normal, t);
     tangential[r.a].force += t;

@@ -17,7 +17,7 @@ namespace impact {
 /// bodies stay as they are (weight).
 class Scene {
  public:
-  Surroundings around;
+  ContactGeometry around;
   double reach = 0.0;  ///< m, of the search for candidates; 0 = as large as the motion asks for
   bool row = false;    ///< bodies along x that never change places: contacts between neighbours by number, and with the planes only
 
@@ -49,8 +49,8 @@ class Scene {
       velocity_[i] = b.velocity;
       spin_[i] = b.spin;
       if (count_ == 0) continue;
-      velocity_[i] += (0.5 * dt / b.mass) * (b.force + system_.pushes()[i].force);
-      spin_[i] += (0.5 * dt / b.inertia) * (b.torque + system_.pushes()[i].torque);
+      velocity_[i] += (0.5 * dt / b.mass) * (b.force + system_.wrenches()[i].force);
+      spin_[i] += (0.5 * dt / b.inertia) * (b.torque + system_.wrenches()[i].torque);
     }
     return report;
   }
@@ -60,8 +60,8 @@ class Scene {
     const double dt = system_.settings().dt, kick = (count_ == 0 ? 0.5 : 1.0) * dt;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       Body& b = bodies_[i];
-      b.velocity += (kick / b.mass) * (b.force + system_.pushes()[i].force);
-      b.spin += (kick / b.inertia) * (b.torque + system_.pushes()[i].torque);
+      b.velocity += (kick / b.mass) * (b.force + system_.wrenches()[i].force);
+      b.spin += (kick / b.inertia) * (b.torque + system_.wrenches()[i].torque);
       b.position += dt * b.velocity;
     }
     for (Plane& p : around.planes) p.point += dt * p.velocity;

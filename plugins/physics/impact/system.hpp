@@ -70,7 +70,7 @@ class System {
   /// Appends all candidates with gap <= reach (m) to `contacts`.
   using Search = std::function<void(double reach, std::vector<Contact>& contacts)>;
 
-  /// The forces of the contacts of a step; see pushes().
+  /// The forces of the contacts of a step; see wrenches().
   /// time: s, of this step. kick: see above, in (0, 1]. A call with the time of the last one does that step again, from the state
   /// before it: histories, totals and records count it once. Wrong bodies or contacts leave the system as it was.
   /// search: asked again with a larger reach where the motion that comes out could have closed gaps beyond the first. wall_speed (m/s):
@@ -108,7 +108,7 @@ class System {
   }
 
   /// Of the contacts on each body, body damping included, in the order of the bodies.
-  const std::vector<Push>& pushes() const { return pushes_; }
+  const std::vector<ContactWrench>& wrenches() const { return wrenches_; }
   const StepReport& report() const { return report_; }
   /// Of the last step, sorted by (key_a, key_b): the candidates that were solved for. The others are open.
   const std::vector<ContactResult>& contacts() const {
@@ -214,17 +214,17 @@ class System {
     motion_.go_back(middle);
     for (std::size_t i = 0; i < rows.size(); ++i)
       if (forces_.active[i] || !rows[i].before->idle()) finish_contact(i, length);
-    pushes_.assign(bodies.size(), {});
+    wrenches_.assign(bodies.size(), {});
     for (const int b : motion_.damped) {
       const Vec3<double> change = motion_.change[b].velocity;
       // lambda on theta v' + (1 - theta) v_{n-1/2}
       const Vec3<double> on = -motion_.response[b].damping * (bodies[b].velocity + (g_ / kick_) * change);
-      pushes_[b].force += on;
+      wrenches_[b].force += on;
       report_.dissipated_energy -= length * dot(on, bodies[b].velocity + middle * change);
     }
     for (std::size_t b = 0; b < bodies.size(); ++b) {
-      pushes_[b].force += motion_.normal[b].force + motion_.tangential[b].force;
-      pushes_[b].torque += motion_.tangential[b].torque;
+      wrenches_[b].force += motion_.normal[b].force + motion_.tangential[b].force;
+      wrenches_[b].torque += motion_.tangential[b].torque;
     }
     report_.pivots_total += report_.pivots;
     report_.peak_force_so_far = std::max(report_.peak_force_so_far, report_.peak_force);
@@ -284,7 +284,7 @@ class System {
   NormalForces solver_;
   StepReport report_;
   std::vector<Contact> found_;  ///< by the search of the step
-  std::vector<Push> pushes_;
+  std::vector<ContactWrench> wrenches_;
   double time_ = 0.0, kick_ = 1.0, weight_ = 1.0, h_ = 1.0, g_ = 1.0;
   Unknowns forces_;         ///< z: N, w: D, of the deformed bodies
   Eigen::VectorXd offset_;  ///< m, of q, but for the accelerations

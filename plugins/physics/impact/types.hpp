@@ -128,7 +128,7 @@ struct Settings {
 };
 
 /// What contacts do to a body.
-struct Push {
+struct ContactWrench {
   Vec3<double> force{}, torque{};  ///< N, N m
 
   auto fields() { return std::tie(force, torque); }

@@ -64,7 +64,7 @@ struct ContactPlane {
 };
 
 /// What contacts do to a box: N, and N m about its centre.
-struct Push {
+struct ContactWrench {
   Vector force{}, torque{};
 };
 
@@ -84,10 +84,10 @@ class BoxContacts {
   int count = 0;         ///< points that touch
 
   /// Forces on the boxes at their places, after dt (s) with these velocities; `remember`: xi goes on.
-  const std::vector<Push>& push(double dt, const std::vector<const Body*>& boxes, bool remember) {
+  const std::vector<ContactWrench>& push(double dt, const std::vector<const Body*>& boxes, bool remember) {
     const std::size_t n = boxes.size();
     stretches.resize(of_pair * (n * (n - 1) / 2) + corners * n * planes.size());
-    pushes_.assign(n, Push{});
+    wrenches_.assign(n, ContactWrench{});
     stored = deepest = 0.0;
     count = 0;
     remember_ = remember;
@@ -105,7 +105,7 @@ class BoxContacts {
           touch(a, none, plane.normal, at_surface, radius - distance, 1.0, plane.touch, stretches[at]);
         }
       }
-    return pushes_;
+    return wrenches_;
   }
 
   /// Longest step (s) that resolves the fastest contact, a face of the lightest box on eight points: 0.5 over its frequency.
@@ -201,8 +201,8 @@ class BoxContacts {
     const auto slope = [this](double at, double u, double length) { return at < 1.0 ? (u > 0.0 ? -1.0 : 1.0) * length / radius : 0.0; };
     const Vector by =
         (-0.5 * stiffness * overlap * overlap * turned) * (at_q * slope(at_p, t, lp) * of_t + at_p * slope(at_q, s, lq) * of_s);
-    add(pushes_[a], *(*boxes_)[a], point, by);
-    add(pushes_[b], *(*boxes_)[b], point, -1.0 * by);
+    add(wrenches_[a], *(*boxes_)[a], point, by);
+    add(wrenches_[b], *(*boxes_)[b], point, -1.0 * by);
   }
 
   /// A point (m) at which a and b (or a plane) touch, with an overlap (m); normal: from b to a.
@@ -240,17 +240,17 @@ class BoxContacts {
     deepest = std::max(deepest, overlap);
     ++count;
     const Vector total = force * normal + along;
-    add(pushes_[a], one, point, total);
-    if (other) add(pushes_[b], *other, point, -1.0 * total);
+    add(wrenches_[a], one, point, total);
+    if (other) add(wrenches_[b], *other, point, -1.0 * total);
   }
-  static void add(Push& to, const Body& body, const Vector& point, const Vector& force) {
+  static void add(ContactWrench& to, const Body& body, const Vector& point, const Vector& force) {
     to.force += force;
     to.torque += cross(point - body.position, force);
   }
 
   static constexpr double along_normal = 0.82;
   const std::vector<const Body*>* boxes_ = nullptr;
-  std::vector<Push> pushes_;
+  std::vector<ContactWrench> wrenches_;
   double dt_ = 0.0;
   bool remember_ = true;
 };

@@ -64,8 +64,8 @@ inline const dembark::impact::StepReport& step(dembark::impact::System& system, 
   const auto all = [&](double, std::vector<dembark::impact::Contact>& found) { found = contacts; };
   const dembark::impact::StepReport& report = system.step(bodies, all, 0.0, time, kick, INFINITY);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
-    force[i] += system.pushes()[i].force;
-    torque[i] += system.pushes()[i].torque;
+    force[i] += system.wrenches()[i].force;
+    torque[i] += system.wrenches()[i].torque;
   }
   return report;
 }

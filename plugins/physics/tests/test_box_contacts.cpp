@@ -41,9 +41,9 @@ struct World {
     for (const Body& b : bodies) all.push_back(&b);
     for (long k = std::lround(duration / dt); k > 0; --k) {
       for (Body& b : bodies) b.kick(0.5 * dt), b.drift(dt);
-      const std::vector<Push>& pushes = contacts.push(dt, all, true);
+      const std::vector<ContactWrench>& wrenches = contacts.push(dt, all, true);
       for (std::size_t i = 0; i < bodies.size(); ++i) {
-        bodies[i].load = pushes[i].force, bodies[i].load_torque = pushes[i].torque;
+        bodies[i].load = wrenches[i].force, bodies[i].load_torque = wrenches[i].torque;
         bodies[i].accelerate(gravity);
         bodies[i].kick(0.5 * dt);
       }
@@ -67,7 +67,7 @@ TEST_CASE("springs turn with boxes that turn together, and stay where nothing tu
     std::vector<const Body*> all;
     for (const Body& b : w.bodies) all.push_back(&b);
     const auto sideways = [&](double step) {
-      const Push& push = w.contacts.push(step, all, true)[0];
+      const ContactWrench& push = w.contacts.push(step, all, true)[0];
       return Vector{push.force.x, push.force.y, 0.0};
     };
     w.bodies[0].velocity = {0.1, 0.0, 0.0};

@@ -86,7 +86,7 @@ TEST_CASE("the forces of the last step hold for the bodies that it left, and for
   LastForces last;
   CHECK_FALSE(last.hold(bodies, box));
   last.keep(bodies);
-  last.pushes.assign(3, {{1.0, 2.0, 3.0}, {}});
+  last.wrenches.assign(3, {{1.0, 2.0, 3.0}, {}});
   std::vector<Body> end = bodies;
   for (Body& b : end) b.velocity.y -= 0.1;
   last.move(end);
@@ -113,7 +113,7 @@ TEST_CASE("the forces of the last step hold for the bodies that it left, and for
   in(again);
   in.end();
   CHECK(again.hold(end, box));
-  CHECK(again.pushes[2].force.z == 3.0);
+  CHECK(again.wrenches[2].force.z == 3.0);
   std::vector<double> broken = out.numbers();
   broken.pop_back();
   Archive few(broken);
