@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "dembark/capillary/bridge_law.hpp"
@@ -52,9 +53,9 @@ double determinant(const PairYoungLaplace& bridges, const BridgeCoordinates& x) 
 }
 
 /// Laws whose tables are solved for once.
-const BridgeForce& exact(double degrees) {
-  static std::map<double, BridgeLaw> built;
-  return built.try_emplace(degrees, Model::exact, degrees * degree).first->second;
+const BridgeForce& exact(double degrees, Pairs pairs = Pairs::any) {
+  static std::map<std::pair<double, Pairs>, BridgeLaw> built;
+  return built.try_emplace({degrees, pairs}, Model::exact, degrees * degree, pairs).first->second;
 }
 
 }  // namespace
@@ -146,7 +147,7 @@ TEST_CASE("the table against an independent solver", "[capillary]") {
   };
   const double parts[] = {0.0, 0.1, 0.5, 0.9, 0.99};
   for (const Reference& r : references) {
-    const BridgeLaw force(Model::exact, r.degrees * degree, Pairs::equal);
+    const BridgeForce& force = exact(r.degrees, Pairs::equal);
     CAPTURE(r.degrees, r.volume);
     const double reach = force.rupture_distance(1.0, 1.0, r.volume);
     CHECK_THAT(reach, WithinRel(r.rupture, 1e-5));
