@@ -1,6 +1,7 @@
-// The laws as CUDA compiles them. test_device_code.py lets clang check this file as device code; physics-tests runs it on the processor,
-// where a namespace of its own keeps it apart from the laws as the other files have them.
-#ifdef __CUDA__
+// The laws as CUDA and HIP compile them. test_device_code.py lets clang check this file as device code; physics-tests runs it on the
+// processor, where a namespace of its own keeps it apart from the laws as the other files have them.
+#if defined(__CUDA__) || defined(__HIP__)
+#define CLANG_DEVICE
 #define __host__ __attribute__((host))
 #define __device__ __attribute__((device))
 #define __global__ __attribute__((global))
@@ -20,18 +21,20 @@
 #include <vector>
 
 // A device has the functions of these two. Of other headers of the standard library it has what is constexpr: no containers.
-#ifdef __CUDA__
+#ifdef CLANG_DEVICE
 #pragma clang force_cuda_host_device begin
 #endif
 #include <cmath>
 #include <cstring>
-#ifdef __CUDA__
+#ifdef CLANG_DEVICE
 #pragma clang force_cuda_host_device end
 #else
 #define dembark device_dembark
 #endif
 
+#ifndef __HIPCC__
 #define __CUDACC__
+#endif
 #include "every_law.hpp"
 
 #ifdef REFUSED  // by test_device_code.py, to be refused
