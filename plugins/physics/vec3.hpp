@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-// Each function that runs per contact begins with one of three words. With CUDA's and HIP's compilers, which Kokkos calls too, it is
+// Each function that runs per contact begins with one of three macros. With CUDA's and HIP's compilers, which Kokkos calls too, it is
 // compiled for the processor and for the device (docs/development/device_code.md); other compilers see a plain function.
 //   DEMBARK_FUNCTION  the compiler decides whether it is inlined
 //   DEMBARK_HOT       always inlined: the common path of a law, where a call would cost as much as the law

@@ -42,8 +42,8 @@ def test_every_law_is_device_code(tmp_path: Path, language: str) -> None:
 
 
 REFUSED = {
-    "no word": ("inline double refused(double x) { return x; }", "call to __host__ function"),
-    "no word inside": (
+    "no macro": ("inline double refused(double x) { return x; }", "call to __host__ function"),
+    "no macro inside": (
         "template <class T> T inner(T x) { return x; } DEMBARK_FUNCTION inline double refused(double x) { return inner(x); }",
         "'inner<double>'",
     ),
@@ -57,7 +57,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("language", "what"), [*(("cuda", what) for what in REFUSED), ("hip", "no word inside")])
+@pytest.mark.parametrize(("language", "what"), [*(("cuda", what) for what in REFUSED), ("hip", "no macro inside")])
 def test_what_a_device_cannot_run_is_refused(tmp_path: Path, language: str, what: str) -> None:
     function, says = REFUSED[what]
     (tmp_path / "refused.hpp").write_text(function + "\n", encoding="utf-8")
