@@ -13,13 +13,6 @@ typedef dembark::Vec3<double> Vec3;
 using dembark_family::add;
 using dembark_family::vector;
 
-/// The run ends where the centres of grains i and j, or of grain i and a wall (j < 0), are at the same place: there is no normal.
-inline void check_normal(LAMMPS_NS::Error* error, const LAMMPS_NS::tagint* tag, const Vec3& normal, int i, int j) {
-  if (!dembark::has_no_direction(normal)) return;
-  if (j < 0) error->one(FLERR, "fix wall/dembark: the centre of grain {} lies on the wall", tag[i]);
-  error->one(FLERR, "pair_style dembark/granular: grains {} and {} are at the same place", tag[i], tag[j]);
-}
-
 /// The run ends where a bridge that forms cannot be integrated with this time step (s).
 inline void check_time_step(LAMMPS_NS::Error* error, const dembark::Liquid& liquid, const dembark::ContactBodies& b, double dt) {
   const double limit = liquid.stable_time_step(b.effective_radius(), b.effective_mass());

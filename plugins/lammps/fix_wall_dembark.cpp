@@ -181,7 +181,7 @@ void FixWallDembark::act_on(int i, bool advance) {
     if (history) layout_.load(history, state);
     const double volume = state.bridge_volume;
     const dembark::ContactForce out = contact_step(p, b, update->dt, state, advance);
-    dembark_lammps::check_normal(error, atom->tag, out.normal, i, -1);
+    if (dembark::has_no_direction(out.normal)) error->one(FLERR, "fix wall/dembark: the centre of grain {} lies on the wall", atom->tag[i]);
     const bool touching = out.overlap > 0.0;
     if (advance && !(volume > 0.0) && (state.bridge_volume > 0.0 || (liquid_ && touching)))
       dembark_lammps::check_time_step(error, p.liquid, b, update->dt);

@@ -26,7 +26,7 @@ using dembark::ContactState;
 using dembark_lammps::add;
 using dembark_lammps::vector;
 
-PairDembarkGranular::PairDembarkGranular(LAMMPS* lmp) : Pair(lmp), coefficients_(lmp), packs_(lmp, coefficients_) {
+PairDembarkGranular::PairDembarkGranular(LAMMPS* lmp) : Pair(lmp), coefficients_(lmp) {
   single_enable = 1;
   restartinfo = 0;  // the script gives the coefficients again
   no_virial_fdotr_compute = 1;
@@ -101,11 +101,17 @@ void PairDembarkGranular::init_style() {
   liquid_ = layout_.imbalance ? dembark_lammps::find_liquid(modify) : nullptr;
   if (layout_.imbalance && !liquid_) coefficients_.fail("carried_liquid on needs the liquid: fix ID all capillary/liquid content C");
   // Lists of bonded atoms hold pairs that do not interact.
-  tally_ = dembark_lammps::find_energy_tally(modify);
+  energies_ = dembark_lammps::find_energy_tally(modify);
   rigid_.clear();
   for (Fix* const fix : modify->get_fix_list())
     if (fix->rigid_flag) rigid_.push_back(fix);
-  packed_ = packs_.prepare(freeze_bit_, liquid_, tally_) && atom->molecular == Atom::ATOMIC;
+  const dembark::ContactParameters& any = coefficients_(1, 1);
+  packed_ = any.normal_law == dembark::NormalLaw::hertz && !any.liquid.viscous.on() && asked() && atom->molecular == Atom::ATOMIC;
+  const auto place = [](bool there, int at) { return there ? at : -1; };
+  begin(*atom,
+        {0, place(layout_.bridge, layout_.bridge_at()), place(layout_.rings, layout_.rings_at()),
+         place(layout_.rolling, layout_.rolling_at()), layout_.imbalance_at()},
+        freeze_bit_, liquid_, energies_);
   find_radii();
   history_->force_reneighbor = grains_grow_;
   history_->next_reneighbor = -1;
@@ -239,6 +245,24 @@ void PairDembarkGranular::tally(int i, int j, const ContactBodies& b, const Cont
   ev_tally_xyz(i, j, atom->nlocal, force->newton_pair, 0.0, 0.0, f.x, f.y, f.z, d.x, d.y, d.z);
 }
 
+void PairDembarkGranular::refuse_coincidence(int i, int j) const {
+  error->one(FLERR, "pair_style dembark/granular: grains {} and {} are at the same place", atom->tag[i], atom->tag[j]);
+}
+
+void PairDembarkGranular::check_reach(int, int, double rupture_distance) const {
+  dembark_lammps::check_reach(error, rupture_distance, neighbor->skin);
+}
+
+void PairDembarkGranular::advance_packs() {
+  const int owned = force->newton_pair ? atom->nlocal + atom->nghost : atom->nlocal;
+  dembark::PairStep step = describe(*list, atom->ntypes, masses(), owned, update->dt, true, true);
+  step.stride = layout_.size();
+  step.flags = history_->firstflag;
+  step.histories = history_->firstvalue;
+  step.contact_flags = step.bridge_flag = 1;
+  PackedContacts::compute_packs(step);
+}
+
 void PairDembarkGranular::compute(int eflag, int vflag) {
   ev_init(eflag, vflag);
   if (history_->nlocal_neigh != atom->nlocal) error->one(FLERR, "dembark: LAMMPS's fix NEIGH_HISTORY is not what it was");
@@ -259,7 +283,7 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
         const ContactForce out = contact_step(coefficients_(atom->type[i], atom->type[j]), b, update->dt, state, true);
         if (out.interacting) tally(i, j, b, out);
       });
-    packs_.step(*list, *history_, masses());
+    if (list->inum > 0) advance_packs();
     return;
   }
   double **const f = atom->f, **const torque = atom->torque;
@@ -271,11 +295,11 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
     if (touched) layout_.load(row, state);
     const bool was_bridged = state.bridge_volume > 0.0;
     const ContactForce out = contact_step(p, b, update->dt, state, advance);
-    dembark_lammps::check_normal(error, atom->tag, out.normal, i, j);
+    if (dembark::has_no_direction(out.normal)) refuse_coincidence(i, j);
     if (advance) {
       if (state.bridge_volume > 0.0 && !was_bridged) {
         dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
-        dembark_lammps::check_reach(error, state.rupture_distance, neighbor->skin);
+        check_reach(i, j, state.rupture_distance);
       }
       touches = out.interacting;
       const double before = was_bridged ? row[layout_.bridge_at()] : 0.0;
@@ -289,7 +313,7 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
     }
     if (!out.interacting) return;
     // Two frozen grains have no works.
-    if (tally_ && !(atom->mask[i] & atom->mask[j] & freeze_bit_)) tally_->add(p, b, out, state, advance, i, j);
+    if (energies_ && !(atom->mask[i] & atom->mask[j] & freeze_bit_)) energies_->add(p, b, out, state, advance, i, j);
     add(f[i], out.force);
     add(torque[i], out.torque_1);
     if (force->newton_pair || j < atom->nlocal) {

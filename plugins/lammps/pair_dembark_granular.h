@@ -20,7 +20,7 @@
 
 namespace LAMMPS_NS {
 
-class PairDembarkGranular : public Pair {
+class PairDembarkGranular : public Pair, dembark_family::PackedContacts {
  public:
   PairDembarkGranular(LAMMPS* lmp);
   ~PairDembarkGranular() override;
@@ -44,13 +44,12 @@ class PairDembarkGranular : public Pair {
  private:
   static constexpr int single_numbers = 18;
   dembark_lammps::ContactCoefficients coefficients_;
-  dembark_lammps::PackedContacts packs_;
   bool packed_ = false;  // packs know the law
   class FixCapillaryLiquid* liquid_ = nullptr;
   std::string history_name_;  // begins the name of the fix
   dembark_lammps::NeighborHistory* history_ = nullptr;
   dembark::HistoryLayout layout_;
-  dembark_lammps::EnergyTally* tally_ = nullptr;
+  dembark_lammps::EnergyTally* energies_ = nullptr;
   int freeze_bit_ = 0;
   std::vector<double> largest_radius_;  // m, of each type, for which lists are made
   bool grains_grow_ = false;            // during a run
@@ -65,6 +64,10 @@ class PairDembarkGranular : public Pair {
   dembark::ContactBodies bodies(int i, int j) const;
   template <class Visit>
   void each_contact(Visit visit);
+  const dembark::ContactParameters& law(int type_i, int type_j) const override { return coefficients_(type_i, type_j); }
+  void refuse_coincidence(int i, int j) const override;
+  void check_reach(int i, int j, double rupture_distance) const override;
+  void advance_packs();
   void tally(int i, int j, const dembark::ContactBodies& bodies, const dembark::ContactForce& out);
   const double* masses() const { return rigid_.empty() ? atom->rmass : masses_.data(); }
   void take_body_masses();

@@ -16,6 +16,11 @@
 
 namespace dembark_family {
 
+/// Where the row of numbers of a contact has the parts of its state; -1: nowhere.
+struct HistoryPlaces {
+  int friction = 0, bridge = -1, rings = -1, rolling = -1, imbalance = -1;
+};
+
 /// Of Hertzian contacts, in steps of some duration: their states must be in their histories.
 class PackedTally : public dembark::ResultStore {
   typedef dembark::Vec3<double> Vec3;
@@ -24,12 +29,11 @@ class PackedTally : public dembark::ResultStore {
  public:
   dembark::ContactTally* sums = nullptr;  ///< of the fix; nullptr: nobody asks
   const LAMMPS_NS::Atom* atom = nullptr;
-  /// Where a history has friction, the rings of partial slip and the rolling spring; -1: it has none.
-  int friction_at = 0, rings_at = -1, angle_at = -1;
+  HistoryPlaces at;
   int frozen = 0;  ///< bit of grains that never move: two of them have no works
 
-  /// What no row of the results has, of a contact in the block: pull of its bridge (N); couple of rolling resistance (N m), if it is on.
-  void note_pull(int k, double pull) { pulls_[std::size_t(k)] = pull; }
+  /// What no row of the results has, of a contact in the block: force of its bridge (N); couple of rolling resistance (N m), if it is on.
+  void note_capillary_force(int k, double force) { capillary_forces_[std::size_t(k)] = force; }
   void note_rolling(int k, bool on, const Vec3& couple) {
     rolls_[std::size_t(k)] = on;
     couples_[std::size_t(k)] = couple;
@@ -41,7 +45,7 @@ class PackedTally : public dembark::ResultStore {
   }
 
  private:
-  std::array<double, PairBlock::room> pulls_{};
+  std::array<double, PairBlock::room> capillary_forces_{};
   std::array<bool, PairBlock::room> rolls_{};
   std::array<Vec3, PairBlock::room> couples_{};
 
@@ -49,22 +53,23 @@ class PackedTally : public dembark::ResultStore {
     constexpr double exponent = 1.5;
     const int i = block.grain[k], j = block.partner[k];
     const bool touches = block.pick[k] & 1;
-    const double pull = pulls_[std::size_t(k)];
-    if ((!touches && pull == 0.0) || (atom->mask[i] & atom->mask[j] & frozen)) return;
+    const double capillary_force = capillary_forces_[std::size_t(k)];
+    if ((!touches && capillary_force == 0.0) || (atom->mask[i] & atom->mask[j] & frozen)) return;
     const Vec3 apart = vector(atom->x[i]) - vector(atom->x[j]);
     const double distance = std::sqrt(dot(apart, apart));
     const Vec3 normal = (1.0 / distance) * apart;
     dembark::ContactParts parts;
-    parts[dembark::ContactPart::capillary] = -pull * normal;
+    parts[dembark::ContactPart::capillary] = -capillary_force * normal;
     if (touches) {
       const double *const history = block.history[k], overlap = atom->radius[i] + atom->radius[j] - distance;
       const double normal_stiffness = of.normal[0][3], tangential_stiffness = of.friction[0][3];
       std::optional<dembark::SlipRings> rings;
-      if (rings_at >= 0) rings = dembark::load_rings(history + rings_at);
-      split_touching(parts, normal, overlap, normal_stiffness * overlap / exponent, exponent, dot(vector(of.normal[0]), normal) + pull,
-                     tangential_stiffness, vector(of.friction[0]), vector(history + friction_at), rings ? &*rings : nullptr);
+      if (at.rings >= 0) rings = dembark::load_rings(history + at.rings);
+      split_touching(parts, normal, overlap, normal_stiffness * overlap / exponent, exponent,
+                     dot(vector(of.normal[0]), normal) + capillary_force, tangential_stiffness, vector(of.friction[0]),
+                     vector(history + at.friction), rings ? &*rings : nullptr);
       if (rolls_[std::size_t(k)])
-        split_rolling(parts, couples_[std::size_t(k)], angle_at >= 0 ? vector(history + angle_at) : Vec3{},
+        split_rolling(parts, couples_[std::size_t(k)], at.rolling >= 0 ? vector(history + at.rolling) : Vec3{},
                       dembark::rolling_stiffness(tangential_stiffness, dembark::reduced(atom->radius[i], atom->radius[j])));
     }
     dembark::ContactLevers levers;

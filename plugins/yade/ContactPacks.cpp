@@ -88,7 +88,7 @@ void ContactPacks::add(const Interaction& interaction, FinnieRabinowiczPhys& dat
 	if (crosses(scene, interaction.cellDist))
 		block.partner[k] = spheres.addImage(threadNumber(), k, id2, imageShift(scene, interaction.cellDist),
 		                                    imageDrift(scene, interaction.cellDist));
-	block.kind[k]               = data.kind;
+	block.law_index[k]          = data.kind;
 	block.history[k]            = histories[k];
 	partner[k]                  = id2;
 	phys[k]                     = &data;
@@ -113,11 +113,11 @@ ContactPacks::Vec3 ContactPacks::friction(const Block& b, int k, const Vec3& nor
 	return force;
 }
 
-void ContactPacks::bridges(const Block& b, int first, int count, const double* gap, double* pull) {
+void ContactPacks::bridges(const Block& b, int first, int count, const double* gap, double* capillaryForce) {
 	for (int n = 0; n < count; ++n) {
 		FinnieRabinowiczPhys& data    = *phys[first + n];
 		const Real            radius1 = step.radius[b.grain[first + n]], radius2 = step.radius[b.partner[first + n]];
-		pull[n] = data.capillaryForce =
+		capillaryForce[n] = data.capillaryForce =
 			bridge_step(data.contact.liquid, radius1, radius2, gap[n], true, data.bridgeVolume, data.ruptureDistance);
 	}
 }

@@ -40,7 +40,7 @@ private:
 };
 
 /// The contacts of one thread that wait to be computed.
-class ContactPacks : ::dembark::ScalarLaws, ::dembark::ResultStore {
+class ContactPacks : ::dembark::ContactCallbacks, ::dembark::ResultStore {
 public:
 	typedef Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz Law;
 
@@ -62,23 +62,23 @@ private:
 
 	Vec3 friction(const Block&, int k, const Vec3& normal, double twist, const ::dembark::NormalResponse<double>&,
 	              const Vec3& velocity) override;
-	void bridges(const Block&, int first, int count, const double* gap, double* pull) override;
+	void bridges(const Block&, int first, int count, const double* gap, double* capillaryForce) override;
 	void store(const Block&, int first, int count, const ::dembark::PackResults&) override;
 
 	static const ::dembark::PairLoops& loops();
 
-	Scene&                                  scene;
-	Spheres&                                spheres;
-	::dembark::PairStep                     step;
-	std::vector<::dembark::PairLaw<double>> kinds;
-	Block                                   block;
-	double                                  histories[Block::room][5];  // displacement, slip and energy of friction
-	FinnieRabinowiczPhys*                   phys[Block::room];
-	ScGeom*                                 geom[Block::room];
-	Body::id_t                              partner[Block::room];
-	Vector3r *                              forces, *torques;  // of the thread, by id
-	int                                     waiting = 0;
-	long                                    done    = 0;
+	Scene&                                             scene;
+	Spheres&                                           spheres;
+	::dembark::PairStep                                step;
+	std::vector<::dembark::PackedCoefficients<double>> kinds;
+	Block                                              block;
+	double                                             histories[Block::room][5];  // displacement, slip and energy of friction
+	FinnieRabinowiczPhys*                              phys[Block::room];
+	ScGeom*                                            geom[Block::room];
+	Body::id_t                                         partner[Block::room];
+	Vector3r *                                         forces, *torques;  // of the thread, by id
+	int                                                waiting = 0;
+	long                                               done    = 0;
 };
 
 /// As Ig2_Sphere_Sphere_ScGeom does it: the same bits, for all that look at them.

@@ -114,9 +114,9 @@ void LawKinds::clear() {
 	kinds.clear();
 }
 
-std::vector<::dembark::PairLaw<double>> LawKinds::laws(double dt) {
-	const std::lock_guard<std::mutex>       lock(guard);
-	std::vector<::dembark::PairLaw<double>> all;
+std::vector<::dembark::PackedCoefficients<double>> LawKinds::laws(double dt) {
+	const std::lock_guard<std::mutex>                  lock(guard);
+	std::vector<::dembark::PackedCoefficients<double>> all;
 	for (const Kind& kind : kinds) {
 		const ::dembark::FinnieRabinowicz& f = kind.friction;
 		all.push_back({kind.elasticity.effective_youngs_modulus, kind.elasticity.effective_shear_modulus, kind.elasticity.damping,
@@ -247,7 +247,7 @@ void Law2::postLoad(Law2&) {
 	revision = -static_cast<double>(++revisions);
 }
 
-std::vector<::dembark::PairLaw<double>> Law2::forPacks(::dembark::PairStep& step) {
+std::vector<::dembark::PackedCoefficients<double>> Law2::forPacks(::dembark::PairStep& step) {
 	step.wet                = wet;
 	step.limit_force        = limited;
 	step.tangential_damping = damped;

@@ -37,7 +37,7 @@ public:
 	int  of(const ::dembark::ContactParameters&);
 	void clear();
 	/// For time steps of this length.
-	std::vector<::dembark::PairLaw<double>> laws(double dt);
+	std::vector<::dembark::PackedCoefficients<double>> laws(double dt);
 
 private:
 	struct Kind {
@@ -166,7 +166,7 @@ public:
 	long bridgeCount() const;
 	long contactCount() const;
 	/// What packs take of the law: its kinds for the time step of `step`, and into `step` its switches.
-	std::vector<::dembark::PairLaw<double>> forPacks(::dembark::PairStep& step);
+	std::vector<::dembark::PackedCoefficients<double>> forPacks(::dembark::PairStep& step);
 	FUNCTOR2D(ScGeom, FinnieRabinowiczPhys);
 
 	const shared_ptr<LiquidExchange> exchange = boost::make_shared<LiquidExchange>();

@@ -57,22 +57,23 @@ bool SphereContactLoop::separated(Body::id_t id1, Body::id_t id2, const Vector3i
 	return (pos2 - spheres.pos(id1)).squaredNorm() > reach * sum * sum;
 }
 
-/// What the short way does for the pair: nothing, or no more than to see that it is too far apart to touch, or its step.
-SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& interaction, ContactPacks& packs) {
-	if (!meeting || interaction->functorCache.geom.get() != meeting) return Way::none;
+/// What the short path does for the pair: nothing, or no more than to see that it is too far apart to touch, or its step.
+SphereContactLoop::PairPath SphereContactLoop::take(const shared_ptr<Interaction>& interaction, ContactPacks& packs) {
+	if (!meeting || interaction->functorCache.geom.get() != meeting) return PairPath::none;
 	const Body::id_t id1 = interaction->getId1(), id2 = interaction->getId2();
-	if (!interaction->isReal()) return separated(id1, id2, interaction->cellDist) ? Way::apart : Way::none;
-	if (!spheres.known(id1) || !spheres.known(id2)) return Way::none;
+	if (!interaction->isReal()) return separated(id1, id2, interaction->cellDist) ? PairPath::apart : PairPath::none;
+	if (!spheres.known(id1) || !spheres.known(id2)) return PairPath::none;
 	const Vector3r pos1 = spheres.pos(id1), pos2 = spheres.pos(id2) + imageShift(*scene, interaction->cellDist);
 	const Real     radius1 = spheres.radius(id1), radius2 = spheres.radius(id2), sum = radius1 + radius2;
 	const Real     squared = (pos2 - pos1).squaredNorm();
-	if (!law || interaction->functorCache.constLaw.get() != law || interaction->functorCache.phys.get() != physics) return Way::none;
+	if (!law || interaction->functorCache.constLaw.get() != law || interaction->functorCache.phys.get() != physics)
+		return PairPath::none;
 	auto& phys = static_cast<FinnieRabinowiczPhys&>(*interaction->phys);
-	if (phys.preparedBy != law->revision || !(spheres.dynamic(id1) || spheres.dynamic(id2))) return Way::none;
+	if (phys.preparedBy != law->revision || !(spheres.dynamic(id1) || spheres.dynamic(id2))) return PairPath::none;
 	// Those at the very end of a contact, and those without a normal, are left to the law.
 	if (packs.know(phys) && squared > 0.0 && squared < (1.0 - 1e-9) * sum * sum) {
 		packs.add(*interaction, phys);
-		return Way::touching;
+		return PairPath::touching;
 	}
 
 	packs.finish();
@@ -82,7 +83,7 @@ SphereContactLoop::Way SphereContactLoop::take(const shared_ptr<Interaction>& in
 	const ::dembark::ContactForce out = law->act(phys, *interaction, view);
 	dembark_yade::setSphereGeometry(static_cast<ScGeom&>(*interaction->geom), pos1, radius1, pos2, radius2);
 	if (!out.interacting) scene->interactions->requestErase(interaction);
-	return Way::touching;
+	return PairPath::touching;
 }
 
 /// One interaction by the functors of the three dispatchers, each found once and then known to the interaction.
@@ -184,11 +185,11 @@ void SphereContactLoop::action() {
 					fetchAhead(all, i, end);
 					Apart& known = distant[i];
 					if (known.interaction == all[i] && separated(known.id1, known.id2, known.cellDist)) return;
-					const Way way = take(all[i], packs);
-					if (way == Way::apart) known = {all[i], all[i]->getId1(), all[i]->getId2(), all[i]->cellDist};
+					const PairPath path = take(all[i], packs);
+					if (path == PairPath::apart) known = {all[i], all[i]->getId1(), all[i]->getId2(), all[i]->cellDist};
 					else known.interaction.reset();
-					if (way == Way::none) dispatch(all[i], packs);
-					taken += way == Way::touching;
+					if (path == PairPath::none) dispatch(all[i], packs);
+					taken += path == PairPath::touching;
 				});
 		}
 		safely([&] { packs.finish(); });

@@ -15,9 +15,9 @@
 namespace dembark {
 
 template <class P>
-DEMBARK_HOT PairLaw<P> laws_of_kinds(const PairLaw<double>* laws, const int* kind) {
-  const Quad<P> a = rows<P, 4>([=](int k) { return &laws[kind[k]].effective_youngs_modulus; });
-  const Quad<P> b = rows<P, 4>([=](int k) { return &laws[kind[k]].kinetic_friction; });
+DEMBARK_HOT PackedCoefficients<P> gathered_laws(const PackedCoefficients<double>* laws, const int* law_index) {
+  const Quad<P> a = rows<P, 4>([=](int k) { return &laws[law_index[k]].effective_youngs_modulus; });
+  const Quad<P> b = rows<P, 4>([=](int k) { return &laws[law_index[k]].kinetic_friction; });
   return {a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w};
 }
 
@@ -76,7 +76,7 @@ inline void gather(const PairStep& s, PairBlock& b, int found) {
     const int place = b.pick[k] >> 1;
     b.history[k] = s.histories[i] + static_cast<long>(s.stride) * place;
     b.flags[k] = s.flags[i] + place;
-    b.kind[k] = s.type[i] * s.types + s.type[j];
+    b.law_index[k] = s.type[i] * s.types + s.type[j];
     // By the time that the pair's turn has come these are there.
     __builtin_prefetch(b.history[k] + s.offset, 1);
     __builtin_prefetch(b.history[k] + s.offset + 4, 1);
@@ -94,7 +94,7 @@ inline void repeat_last(PairBlock& b, int found) {
   for (int k = found; k % P::size; ++k) {
     b.grain[k] = b.grain[found - 1];
     b.partner[k] = b.partner[found - 1];
-    b.kind[k] = b.kind[found - 1];
+    b.law_index[k] = b.law_index[found - 1];
     b.history[k] = b.history[found - 1];
   }
 }
@@ -145,7 +145,7 @@ struct Slip {
   FrictionState<P> moved{};
 };
 template <class P>
-__attribute__((noinline)) Slip<P> slip_of(const PairLaw<P>& law, const NormalResponse<P>& response, const PackVec<P>& increment,
+__attribute__((noinline)) Slip<P> slip_of(const PackedCoefficients<P>& law, const NormalResponse<P>& response, const PackVec<P>& increment,
                                           const LaneMask<P>& unsure, const FrictionState<P>& state) {
   // Bounded, which what is no number is not.
   const auto plain = unsure & !(law.interface_shear_strength < unlimited_strength) &
@@ -165,7 +165,7 @@ DEMBARK_HOT void replace(const LaneMask<P>& which, PackVec<P>& old, const PackVe
 /// kept of those that slide as a whole. Returns the lanes that it has served: of the others, which are new or have changed much, nothing
 /// has changed.
 template <class P>
-DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int first, unsigned there, const PairLaw<P>& law,
+DEMBARK_HOT unsigned partial_slip(const PairStep& s, const PairBlock& b, int first, unsigned there, const PackedCoefficients<P>& law,
                                   const PackVec<P>& normal, const P& twist, const PackVec<P>& velocity, NormalResponse<P>& response,
                                   FrictionState<P>& state, P& kept_slip) {
   constexpr int N = P::size;
@@ -243,11 +243,11 @@ template <class P, bool Elastic>
 inline void compute(const PairStep& s, PairBlock& b, int found) {
   constexpr int N = P::size;
   repeat_last<P>(b, found);
-  PairLaw<P> law = laws_of_kinds<P>(s.laws, b.kind);
+  PackedCoefficients<P> law = gathered_laws<P>(s.laws, b.law_index);
   for (int first = 0; first < found; first += N) {
     const int *i = b.grain + first, *j = b.partner + first, count = found - first < N ? found - first : N;
     const unsigned there = (1u << count) - 1;
-    if (!s.one_law) law = laws_of_kinds<P>(s.laws, b.kind + first);
+    if (!s.one_law) law = gathered_laws<P>(s.laws, b.law_index + first);
     const P radius_i = values<P>(s.radius, i), radius_j = values<P>(s.radius, j), radius_sum = radius_i + radius_j;
     const PackVec<P> delta = rows3<P>(s.x, i) - rows3<P>(s.x, j);
     const P squared = dot(delta, delta), distance = sqrt(squared), overlap = radius_sum - distance, half = 0.5 * overlap;
@@ -269,8 +269,8 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
     const SurfaceMotion<P> motion =
         surface_motion<P>(normal, rows3<P>(s.v, i) - rows3<P>(s.v, j), radius_i - half, omega_i, radius_j - half, omega_j);
     NormalResponse<P> response =
-        adjusted(hertz<PairLaw<P>, P>(law, radius_i * radius_j / radius_sum, reduced_mass, overlap, motion.normal_velocity), s.limit_force,
-                 s.tangential_damping);
+        adjusted(hertz<PackedCoefficients<P>, P>(law, radius_i * radius_j / radius_sum, reduced_mass, overlap, motion.normal_velocity),
+                 s.limit_force, s.tangential_damping);
     // Until friction is known, the force that limits it is the normal one here.
     [[maybe_unused]] P with_damping;
     if constexpr (Elastic) {

@@ -31,7 +31,7 @@ struct Pack;
 
 /// What the laws take of a pair of types; eight numbers, read as two rows of four.
 template <class Real>
-struct PairLaw {
+struct PackedCoefficients {
   Real effective_youngs_modulus, effective_shear_modulus, damping;
   Real static_friction, kinetic_friction, interface_shear_strength, kept_slip;
   Real critical_slip_distance;
@@ -39,24 +39,24 @@ struct PairLaw {
 
 /// The pairs in work: those that touch, and those with a contact or a bridge stored, to hold or to end it.
 struct PairBlock {
-  static constexpr int capacity = 128, room = capacity + 16;  // some room behind for whole packs
-  alignas(64) int grain[room], partner[room], kind[room];     // kind: place in the table of laws
-  alignas(64) int pick[room];                                 // 2 * place among the grain's neighbours, + 1 if they touch
+  static constexpr int capacity = 128, room = capacity + 16;    // some room behind for whole packs
+  alignas(64) int grain[room], partner[room], law_index[room];  // law_index: place in the table of laws
+  alignas(64) int pick[room];                                   // 2 * place among the grain's neighbours, + 1 if they touch
   int* flags[room];
   double* history[room];
 };
 
 /// The laws of single contacts, which the packs leave the rare ones to. `k`: place in the block.
-struct ScalarLaws {
+struct ContactCallbacks {
   /// Friction on the first grain (N); the state is stored.
   virtual Vec3<double> friction(const PairBlock& block, int k, const Vec3<double>& normal, double twist,
                                 const NormalResponse<double>& response, const Vec3<double>& velocity) = 0;
-  /// Pulls (N) of the bridges of `count` pairs over their gaps (m).
-  virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* pull) = 0;
+  /// Forces (N, > 0: pulls) of the bridges of `count` pairs over their gaps (m).
+  virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* capillary_force) = 0;
 };
 
 /// The same of contacts that remember more: the rings of partial slip, a rolling spring.
-struct ScalarMemory {
+struct HistoryCallbacks {
   /// Couple of rolling resistance on the first grain (N m); the state is stored.
   virtual Vec3<double> rolling(const PairBlock& block, int k, const Vec3<double>& normal, double twist, double normal_force,
                                double tangential_stiffness, const Vec3<double>& spin) = 0;
@@ -80,16 +80,16 @@ struct ResultStore {
 
 /// What a step works on. Arrays of grains are (grains, 3) or (grains), in SI units.
 struct PairStep {
-  ScalarLaws& scalar;
-  ScalarMemory* memory = nullptr;         ///< asked with `rings` or `rolls` only
-  ResultStore* results = nullptr;         ///< gets what the contacts have come to, unless null
-  const PairLaw<double>* laws = nullptr;  ///< one a pair of types, row by row
-  int types = 0;                          ///< in a row
-  bool one_law = false;                   ///< for all contacts that come
-  int owned = 0;                          ///< grains from here on get no forces
-  int offset = 0;                         ///< of friction in a history
-  int rings = -1;                         ///< of partial slip; -1: there is none
-  int more = -1, more_numbers = 0;        ///< of partial slip and of a rolling spring together; -1: there is neither
+  ContactCallbacks& scalar;
+  HistoryCallbacks* memory = nullptr;                ///< asked with `rings` or `rolls` only
+  ResultStore* results = nullptr;                    ///< gets what the contacts have come to, unless null
+  const PackedCoefficients<double>* laws = nullptr;  ///< one a pair of types, row by row
+  int types = 0;                                     ///< in a row
+  bool one_law = false;                              ///< for all contacts that come
+  int owned = 0;                                     ///< grains from here on get no forces
+  int offset = 0;                                    ///< of friction in a history
+  int rings = -1;                                    ///< of partial slip; -1: there is none
+  int more = -1, more_numbers = 0;                   ///< of partial slip and of a rolling spring together; -1: there is neither
   double dt = 0.0;
   bool wet = false, limit_force = false, tangential_damping = true;
   bool elastic_limit = false;  ///< FrictionLimit::elastic, of all laws
@@ -113,7 +113,7 @@ struct PairStep {
 /// All pairs of the neighbour lists, in packs of the type `P`.
 template <class P>
 void pair_packs(const PairStep& step, PairBlock& block);
-/// The first `found` pairs of the block, whose grains, kinds and histories are filled in, and all of which touch.
+/// The first `found` pairs of the block, whose grains, law indices and histories are filled in, and all of which touch.
 template <class P>
 void picked_packs(const PairStep& step, PairBlock& block, int found);
 

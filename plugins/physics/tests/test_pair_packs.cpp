@@ -18,7 +18,7 @@ namespace {
 const capillary::BridgeLaw bridge{capillary::Model::willett, 0.3};
 
 /// Grains, and a list with each pair once; the laws of rare contacts as adapters have them.
-struct Scene : ScalarLaws, ScalarMemory {
+struct Scene : ContactCallbacks, HistoryCallbacks {
   int count = 0;
   std::vector<double> x, v, omega, radius, mass, f, torque;
   std::vector<int> type, mask;
@@ -92,14 +92,14 @@ struct Scene : ScalarLaws, ScalarMemory {
   void step(const PairLoops& loops) {
     f.assign(x.size(), 0.0);
     torque.assign(x.size(), 0.0);
-    const PairLaw<double> numbers{law.elasticity.effective_youngs_modulus,
-                                  law.elasticity.effective_shear_modulus,
-                                  law.elasticity.damping,
-                                  law.friction.static_friction,
-                                  law.friction.kinetic_friction,
-                                  law.friction.interface_shear_strength,
-                                  kept_slip(law.friction, dt),
-                                  law.friction.critical_slip_distance};
+    const PackedCoefficients<double> numbers{law.elasticity.effective_youngs_modulus,
+                                             law.elasticity.effective_shear_modulus,
+                                             law.elasticity.damping,
+                                             law.friction.static_friction,
+                                             law.friction.kinetic_friction,
+                                             law.friction.interface_shear_strength,
+                                             kept_slip(law.friction, dt),
+                                             law.friction.critical_slip_distance};
     std::vector<int> grains, numneigh;
     std::vector<int*> lists, touches;
     std::vector<double*> rows;
