@@ -20,7 +20,7 @@ physics_sources := $(shell find plugins/physics plugins/python postproc/native -
 liggghts_sources := $(shell find plugins/liggghts plugins/lammps_family -type f -not -path '*/tests/*') $(call code,$(filter plugins/physics/%,$(physics_sources)))
 yade_sources := $(shell find plugins/yade -type f -not -path '*/tests/*' -not -name '*.pyc') $(call code,$(filter plugins/physics/%,$(physics_sources)))
 lammps_sources := $(shell find plugins/lammps plugins/lammps_family -type f -not -path '*/tests/*') $(call code,$(filter plugins/physics/%,$(physics_sources)))
-headers := $(filter-out %/first_rank.hpp %/monitor_run.hpp,$(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sources)))))
+headers := $(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sources))))
 
 # The package of LAMMPS is for this processor.
 with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE)$(LAMMPS_INSTALLED),$(BUILD)/.lammps)
@@ -99,7 +99,7 @@ lint: $(VENV)/.complete ## check the sources: rules, types, layout
 	@git ls-files '*.c' '*.cpp' '*.hpp' '*.h' | xargs -r $(BIN)/clang-format --dry-run -Werror
 	@$(MAKE) tidy
 
-# One translation unit holds all headers but those that need MPI.
+# One translation unit holds all headers.
 $(BUILD)/.tidy: .clang-tidy $(headers) $(VENV)/.complete | system
 	@mkdir -p $(BUILD)/lint && ln -sfn $(CURDIR)/plugins/physics $(BUILD)/lint/dembark
 	@printf '#include "%s"\n' $(headers:plugins/physics/%=dembark/%) > $(BUILD)/lint/headers.cpp

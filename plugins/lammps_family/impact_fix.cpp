@@ -43,6 +43,7 @@ void ImpactFix::init() {
   if (!begins_with(update->integrate_style, "verlet"))
     fail(std::string("run_style ") + update->integrate_style + " is not supported; use run_style verlet");
   if (domain->triclinic) fail("a triclinic box is not supported; use an orthogonal one");
+  only_single_grains("it knows");
   check_order();
   torque_scale_ = find_torque_scale();
   find_walls();

@@ -10,7 +10,7 @@
 #include "shared_fix.h"
 
 #include "dembark/impact/coupling.hpp"
-#include "dembark/impact/first_rank.hpp"
+#include "first_rank.h"
 
 namespace dembark_family {
 
@@ -33,7 +33,7 @@ class ImpactFix : public SharedFix {
 
  protected:
   std::unique_ptr<dembark::impact::Coupling> impacts_;
-  dembark::impact::FirstRank ranks_;
+  FirstRank ranks_;
 
  private:
   static constexpr int local_columns = 13;

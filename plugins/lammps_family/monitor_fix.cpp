@@ -15,13 +15,20 @@ using dembark::Vec3;
 namespace dembark_family {
 
 MonitorFix::MonitorFix(LAMMPS* lmp, int narg, char** arg)
-    : GrainFix(lmp, narg, arg), run_(checked([&] { return MonitorRun({arg + std::min(3, narg), arg + narg}, world); })) {
+    : GrainFix(lmp, narg, arg), run_(checked([&] { return dembark::MonitorCommand::read({arg + std::min(3, narg), arg + narg}); })) {
   only_one();
   restart_global = 1;
   nevery = global_freq = 1;
   vector_flag = 1;
-  size_vector = MonitorRun::figures;
+  size_vector = int(MonitorRun::figure_names.size());
   extvector = 0;
+  // In the order of the ranks, so that all have the same bits.
+  run_.merge_processes = [this](dembark::MonitorTally& tally) {
+    std::vector<dembark::MonitorTally> each(std::size_t(comm->nprocs), dembark::MonitorTally{});
+    MPI_Allgather(&tally, int(sizeof tally), MPI_BYTE, each.data(), int(sizeof tally), MPI_BYTE, world);
+    tally = {};
+    for (const dembark::MonitorTally& one : each) tally.merge(one);
+  };
 }
 
 int MonitorFix::setmask() { return FixConst::END_OF_STEP | (run_.impacts > 0 ? FixConst::PRE_FORCE : 0); }
@@ -35,13 +42,14 @@ void MonitorFix::init() {
   find_contacts();
   account_ = fix_of_style("energy/account");
   if (run_.mean_length) {
-    double sum = 0.0, count = 0.0;
+    double mine[] = {0.0, 0.0}, all[2];  // sum and number of the diameters
     for (int i = 0; i < atom->nlocal; ++i)
       if (atom->mask[i] & groupbit) {
-        sum += 2.0 * atom->radius[i];
-        count += 1.0;
+        mine[0] += 2.0 * atom->radius[i];
+        mine[1] += 1.0;
       }
-    if (!run_.measure_length(sum, count)) fail("there are no grains yet whose mean diameter could be taken; give 'length L' (m)");
+    MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_SUM, world);
+    checked([&] { run_.measure_length(all[0], all[1]); });
   }
   run_.begin(update->dt, long(update->ntimestep));
   take_step();
@@ -115,7 +123,7 @@ void MonitorFix::pre_force(int) {
     return now;
   });
   // Atoms have changed their ranks.
-  if (neighbor->ago == 0 || run_.monitor.settings.samples(n)) run_.shadows.drop();
+  if (neighbor->ago == 0 || run_.monitor.settings.samples(n)) drop_impacts();
   if (run_.monitor.settings.samples(n)) begin_impacts(n);
 }
 
@@ -154,7 +162,22 @@ void MonitorFix::begin_impacts(long n) {
       ShadowImpact shadow;
       if (shadow.begin(parameters(atom->type[i], atom->type[j]), bodies(i, j), one, two, update->dt)) mine.push_back(shadow);
     }
-  run_.shadows.add(mine);
+  const int own = int(mine.size() * sizeof(ShadowImpact));
+  std::vector<int> counts(std::size_t(comm->nprocs), 0), offsets(std::size_t(comm -> nprocs), 0);
+  MPI_Allgather(&own, 1, MPI_INT, counts.data(), 1, MPI_INT, world);
+  for (std::size_t r = 1; r < counts.size(); ++r) offsets[r] = offsets[r - 1] + counts[r - 1];
+  std::vector<ShadowImpact> all(std::size_t(offsets.back() + counts.back()) / sizeof(ShadowImpact));
+  if (all.empty()) return;
+  MPI_Allgatherv(mine.data(), own, MPI_BYTE, all.data(), counts.data(), offsets.data(), MPI_BYTE, world);
+  run_.shadows.add(all);
+}
+
+/// Those that have ended on any rank. Collective.
+void MonitorFix::drop_impacts() {
+  std::vector<int>& over = run_.shadows.over;
+  if (over.empty()) return;
+  MPI_Allreduce(MPI_IN_PLACE, over.data(), int(over.size()), MPI_INT, MPI_MAX, world);
+  run_.shadows.drop();
 }
 
 /// Accelerations of steps of another length are no history.
@@ -174,7 +197,11 @@ double MonitorFix::compute_vector(int n) {
 
 /// Collective.
 void MonitorFix::write_restart(FILE* file) {
-  const std::vector<double> saved = run_.saved();
+  drop_impacts();
+  const MonitorRun::State mine = run_.state();
+  std::vector<MonitorRun::State> all(std::size_t(comm->nprocs), MonitorRun::State{});
+  MPI_Gather(&mine, int(sizeof mine), MPI_BYTE, all.data(), int(sizeof mine), MPI_BYTE, 0, world);
+  const std::vector<double> saved = run_.saved(all);
   if (comm->me == 0) write_part(file, {{saved.data(), saved.size() * sizeof(double)}});
 }
 

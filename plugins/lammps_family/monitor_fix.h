@@ -22,7 +22,7 @@ class MonitorFix : public GrainFix {
   void end_of_step() override;
   double compute_vector(int n) override;
   void write_restart(FILE* file) override;
-  void restart(char* buffer) override { run_.restore(buffer); }
+  void restart(char* buffer) override { run_.restore(buffer, comm->me, comm->nprocs); }
 
  protected:
   static constexpr int history_numbers = dembark::monitor_history_numbers;
@@ -52,6 +52,7 @@ class MonitorFix : public GrainFix {
   bool weight(int i, int j, dembark::Vec3<double>& acceleration) const;
   dembark::ContactBodies bodies(int i, int j) const;
   void begin_impacts(long n);
+  void drop_impacts();
   void take_step();
 
   Fix* account_ = nullptr;

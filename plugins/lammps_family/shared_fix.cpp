@@ -29,6 +29,11 @@ void SharedFix::only_verlet() const {
   if (!is_verlet(*update)) fail("only run_style verlet is supported");
 }
 
+void SharedFix::only_single_grains(const std::string& does) const {
+  for (const Fix* const fix : fixes())
+    if (moves_clusters(*fix)) fail(does + " single grains, and fix " + fix->id + " (" + fix->style + ") moves bodies made of several");
+}
+
 void SharedFix::write_part(FILE* file, const std::vector<std::pair<const void*, std::size_t>>& pieces) {
   int bytes = 0;
   for (const auto& [data, size] : pieces) bytes += int(size);
@@ -46,8 +51,8 @@ void GrainFix::find_movers(const std::string& does) {
   moving_ = frozen_ = 0;
   movers_.clear();
   gravities_.clear();
+  only_single_grains(does);
   for (Fix* const fix : fixes()) {
-    if (moves_clusters(*fix)) fail(does + " single grains, and fix " + fix->id + " (" + fix->style + ") moves bodies made of several");
     if (is(*fix, "gravity")) gravities_.push_back({fix->groupbit, acceleration_of(fix)});
     if (is(*fix, "freeze")) frozen_ |= fix->groupbit;
     if (is(*fix, "nve/sphere")) movers_.emplace_back(fix->groupbit, inertia_of(*fix));

@@ -59,6 +59,8 @@ class SharedFix : public dembark_engine::EngineFix {
   Fix* fix_of_style(const char* style) const;
   void only_one() const;
   void only_verlet() const;
+  /// Ends the run where a fix moves bodies made of several grains. `does`: what this fix does with single grains, for messages.
+  void only_single_grains(const std::string& does) const;
   bool has_coherent_units() const { return dembark_family::has_coherent_units(*force); }
 
   /// What `work` returns; what it throws ends the run with its line.

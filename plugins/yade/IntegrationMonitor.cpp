@@ -1,5 +1,5 @@
-// How wrong the steps of a scene are: local errors, the shortest contact, and what follows. The arithmetic is that of
-// dembark/integration/monitor.hpp.
+// How wrong the steps of a scene are: local errors, the shortest contact, and what follows. Arithmetic, rows and findings are those of
+// dembark/integration/monitor_run.hpp.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -15,8 +15,7 @@
 #include "ContactView.hpp"
 #include "FinnieRabinowicz.hpp"
 #include "attributes.hpp"
-#include "dembark/integration/monitor.hpp"
-#include "dembark/integration/shadow_impact.hpp"
+#include "dembark/integration/monitor_run.hpp"
 #include "engine_order.hpp"
 #include "report.hpp"
 
@@ -29,7 +28,7 @@ public:
 	void                preSave(IntegrationMonitor&);
 	void                postLoad(IntegrationMonitor&);
 	void                reset();
-	boost::python::dict figures() const;
+	boost::python::dict figures();
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(IntegrationMonitor,GlobalEngine,"Tells how wrong the steps of a scene are: local errors of positions, velocities and angular velocities, and how many steps the shortest contact takes. Stands after :yref:`InteractionLoop` and all engines that add forces, and before :yref:`NewtonIntegrator`. Adds no force.",
 		((Real,speed,NaN,,"Speed [m/s] that errors of velocities, and of angular velocities times the radius, are measured by. Required."))
@@ -52,36 +51,20 @@ public:
 		.add_property("level",&IntegrationMonitor::level,"With 'adapt': O.dt is what it was at first over 2 to this power")
 	);
 	// clang-format on
-	long nextRow() const { return state.nextRow; }
-	int  level() const { return state.level; }
+	long nextRow() const { return run.next_row(); }
+	int  level() const { return run.level(); }
 
 private:
-	struct Sums {
-		::dembark::MonitorTally run{}, row{};
-		Real                    step    = 0.0;  // s, at first
-		Real                    length  = 0.0;  // m
-		long                    nextRow = -1;
-		int                     level = 0, said = 0;
-	};
+	void                     prepare();
+	bool                     judged(const Body&, const NewtonIntegrator&) const;
+	void                     takeBodies(const NewtonIntegrator&);
+	void                     takeContacts();
+	void                     beginImpact(const Interaction&, const FinnieRabinowiczPhys&);
+	void                     followImpacts(const NewtonIntegrator&);
+	void                     shorten(const NewtonIntegrator&, Real now);
+	::dembark::ContactBodies pairOf(const Body& one, const Body& two) const;
 
-	void prepare();
-	bool judged(const Body&, const NewtonIntegrator&) const;
-	void takeBodies(const NewtonIntegrator&);
-	void takeContacts();
-	void beginImpact(const Interaction&, const FinnieRabinowiczPhys&);
-	void followImpacts(const NewtonIntegrator&);
-	void act();
-	void endRow(const NewtonIntegrator&);
-
-	/// An impact that goes on, and where the second body's image is.
-	struct Shadow {
-		::dembark::ShadowImpact impact{};
-		::dembark::Vec3<double> shift{};
-	};
-
-	::dembark::StepMonitor monitor;
-	Sums                   state;
-	std::vector<Shadow>    shadows;
+	::dembark::MonitorRun run;
 };
 REGISTER_SERIALIZABLE(IntegrationMonitor);
 
@@ -89,14 +72,12 @@ YADE_PLUGIN((IntegrationMonitor));
 
 using ::dembark::AccelerationHistory;
 using ::dembark::MonitorAction;
-using ::dembark::MonitorTally;
+using ::dembark::MonitorRun;
+using ::dembark::ShadowImpact;
 using dembark_yade::fail;
 using dembark_yade::vec;
 
 namespace {
-
-constexpr std::size_t historyNumbers = sizeof(AccelerationHistory) / sizeof(double);
-static_assert(historyNumbers * sizeof(double) == sizeof(AccelerationHistory), "nothing but numbers");
 
 /// m, of a body that is no sphere: of the sphere that turns as hard.
 Real radiusOf(const Body& body) {
@@ -108,30 +89,28 @@ Real radiusOf(const Body& body) {
 
 /// Reads the attributes, which a script may change between two steps.
 void IntegrationMonitor::prepare() {
-	::dembark::MonitorSettings& s = monitor.settings;
-	if (std::isnan(speed)) fail("IntegrationMonitor needs 'speed', the speed (m/s) that errors of velocities are measured by");
-	if (impacts < 0) fail("IntegrationMonitor.impacts must be 0 (none) or more, not " + std::to_string(impacts));
-	if (!::dembark::option_from_name(::dembark::monitor_action_names(), reaction, s.action))
-		fail("IntegrationMonitor.reaction '" + reaction + "' is unknown; it can be report, warn, stop, adapt");
-	if (!std::isnan(length)) {
-		state.length = length;
-	} else if (state.length == 0.0) {
+	::dembark::MonitorCommand command;
+	command.mean_length          = std::isnan(length);
+	command.settings.scales      = {command.mean_length ? 1.0 : length, std::isnan(speed) ? 0.0 : speed, limit};
+	command.settings.every       = every;
+	command.settings.least_steps = contactSteps;
+	command.impacts              = impacts;
+	try {
+		command.set_action(reaction);
+		if (command.settings.action == MonitorAction::adapt) command.rows = rows;
+		command.check();
+		run.set(command);
+		if (!command.mean_length || !run.mean_length) return;
 		Real sum = 0.0, count = 0.0;
 		for (const auto& body : *scene->bodies)
 			if (body && body->isDynamic() && dynamic_cast<const Sphere*>(body->shape.get())) {
 				sum += 2.0 * radiusOf(*body);
 				count += 1.0;
 			}
-		if (count == 0.0)
-			fail("IntegrationMonitor: there are no spheres yet whose mean diameter could be taken; give 'length' (m)");
-		state.length = sum / count;
+		run.measure_length(sum, count);
+	} catch (const std::invalid_argument& wrong) {
+		fail(std::string("IntegrationMonitor: ") + wrong.what());
 	}
-	s.scales      = {state.length, speed, limit};
-	s.every       = every;
-	s.least_steps = contactSteps;
-	if (const char* const wrong = s.error()) fail(std::string("IntegrationMonitor: ") + wrong);
-	if (s.action == MonitorAction::adapt && rows < 1)
-		fail("IntegrationMonitor: reaction 'adapt' needs 'rows', the number (1 or more) of steps between two rows of output");
 }
 
 void IntegrationMonitor::action() {
@@ -139,23 +118,22 @@ void IntegrationMonitor::action() {
 	const long              n      = scene->iter;
 	prepare();
 	// Steps that were not seen, or were of another length, are no history.
-	const Real expected = std::ldexp(state.step, -state.level);
-	if (n != step + 1 || scene->dt != expected) histories.clear();
-	if (scene->dt != expected) {
-		state.step  = scene->dt;
-		state.level = 0;
-	}
-	const bool adapts = monitor.settings.action == MonitorAction::adapt;
-	if (adapts && state.nextRow <= step) state.nextRow = n + rows;
+	if (n != step + 1 || scene->dt != run.step()) histories.clear();
+	if (scene->dt != run.step()) run.take_step(scene->dt);
+	if (run.next_row() <= step) run.begin(scene->dt, n);
 	step = n;
 	scene->forces.sync();
 	followImpacts(newton);
-	if (monitor.settings.keeps(n)) takeBodies(newton);
-	if (monitor.settings.samples(n)) {
+	if (run.monitor.settings.keeps(n)) takeBodies(newton);
+	if (run.monitor.settings.samples(n)) {
 		takeContacts();
-		if (monitor.settings.action == MonitorAction::warn || monitor.settings.action == MonitorAction::stop) act();
+		for (const std::string& found : run.new_findings(n, "body")) {
+			if (run.monitor.settings.action == MonitorAction::stop) fail("IntegrationMonitor: " + found, 1);
+			dembark_yade::warn("IntegrationMonitor: " + found);
+		}
 	}
-	if (adapts && n >= state.nextRow) endRow(newton);
+	run.end_step(n);
+	if (run.step() != scene->dt) shorten(newton, run.step());
 }
 
 bool IntegrationMonitor::judged(const Body& body, const NewtonIntegrator& newton) const {
@@ -168,7 +146,7 @@ bool IntegrationMonitor::judged(const Body& body, const NewtonIntegrator& newton
 
 /// Weight is left out: what is constant makes no error.
 void IntegrationMonitor::takeBodies(const NewtonIntegrator& newton) {
-	histories.resize(scene->bodies->size() * historyNumbers, 0.0);
+	histories.resize(scene->bodies->size() * ::dembark::monitor_history_numbers, 0.0);
 	for (const auto& body : *scene->bodies) {
 		if (!body || !judged(*body, newton)) continue;
 		const Body::id_t id  = body->getId();
@@ -177,10 +155,10 @@ void IntegrationMonitor::takeBodies(const NewtonIntegrator& newton) {
 		::dembark::Dofs a = ::dembark::dofs(vec(push), vec(turn));
 		for (std::size_t k = 0; k < a.size(); ++k)
 			if (own.blockedDOFs >> k & 1) a[k] = 0.0;
-		Real* const         at = histories.data() + std::size_t(id) * historyNumbers;
+		Real* const         at = histories.data() + std::size_t(id) * ::dembark::monitor_history_numbers;
 		AccelerationHistory history;
 		std::memcpy(static_cast<void*>(&history), at, sizeof history);
-		monitor.take(history, a, radiusOf(*body), id, scene->iter, scene->dt);
+		run.monitor.take(history, a, radiusOf(*body), id, scene->iter, scene->dt);
 		std::memcpy(at, &history, sizeof history);
 	}
 }
@@ -209,15 +187,21 @@ void IntegrationMonitor::takeContacts() {
 			for (int k = 1; k <= 2; ++k)
 				if (!dynamic_cast<const Sphere*>((k == 1 ? body1 : body2).shape.get())) wall = k;
 		}
-		monitor.take_contact(mass, stiffness, scene->dt, wall == 1 ? id2 : id1, wall ? ::dembark::monitor_wall : id2);
+		run.monitor.take_contact(mass, stiffness, scene->dt, wall == 1 ? id2 : id1, wall ? ::dembark::monitor_wall : id2);
 	}
 }
 
-namespace {
-
-::dembark::ContactBodies pairOf(const Body& one, const Body& two, const ::dembark::Vec3<double>& shift) {
+/// With the image of `two` that is nearest.
+::dembark::ContactBodies IntegrationMonitor::pairOf(const Body& one, const Body& two) const {
+	Vector3r apart = one.state->pos - two.state->pos;
+	if (scene->isPeriodic) {
+		const Vector3r cells = scene->cell->unshearPt(apart).cwiseQuotient(scene->cell->getSize());
+		Vector3i       image;
+		for (int k = 0; k < 3; ++k) image[k] = int(std::round(cells[k]));
+		apart -= dembark_yade::imageShift(*scene, image);
+	}
 	::dembark::ContactBodies b;
-	b.separation         = vec(one.state->pos) - vec(two.state->pos) - shift;
+	b.separation         = vec(apart);
 	b.velocity_1         = vec(one.state->vel);
 	b.velocity_2         = vec(two.state->vel);
 	b.angular_velocity_1 = vec(one.state->angVel);
@@ -229,119 +213,69 @@ namespace {
 	return b;
 }
 
-}  // namespace
-
 /// If the contact began in this step.
 void IntegrationMonitor::beginImpact(const Interaction& interaction, const FinnieRabinowiczPhys& phys) {
 	const Body::id_t id1 = interaction.getId1(), id2 = interaction.getId2();
 	const Body &     body1 = *Body::byId(id1, scene), &body2 = *Body::byId(id2, scene);
 	if (body1.state->blockedDOFs || body2.state->blockedDOFs || !::dembark::picked(id1, id2, scene->iter, impacts)) return;
-	Shadow shadow;
-	shadow.shift = vec(dembark_yade::imageShift(*scene, interaction.cellDist));
-	if (shadow.impact.begin(phys.contact, pairOf(body1, body2, shadow.shift), id1, id2, scene->dt)) shadows.push_back(shadow);
+	ShadowImpact shadow;
+	if (shadow.begin(phys.contact, pairOf(body1, body2), id1, id2, scene->dt)) run.shadows.add({shadow});
 }
 
 void IntegrationMonitor::followImpacts(const NewtonIntegrator& newton) {
-	typedef ::dembark::ShadowImpact::Stage Stage;
-	std::size_t                            kept = 0;
-	for (Shadow& shadow : shadows) {
-		const Body* const one   = Body::byId(shadow.impact.one, scene).get();
-		const Body* const two   = Body::byId(shadow.impact.two, scene).get();
-		Real              found = 0.0;
-		const Stage stage = one && two
-		                            ? shadow.impact.follow(pairOf(*one, *two, shadow.shift), vec(newton.gravity), scene->dt, found)
-		                            : Stage::dropped;
-		if (stage == Stage::compared) monitor.take_impact(found, shadow.impact.one);
-		if (stage == Stage::going_on) shadows[kept++] = shadow;
-	}
-	shadows.resize(kept);
+	run.shadows.follow(scene->dt, run.monitor, [&](const ShadowImpact& shadow) {
+		const Body* const                 one = Body::byId(shadow.one, scene).get();
+		const Body* const                 two = Body::byId(shadow.two, scene).get();
+		::dembark::ShadowImpacts::Meeting now;
+		now.here   = true;
+		now.judged = one && two;
+		if (now.judged) now.bodies = pairOf(*one, *two);
+		now.gravity = vec(newton.gravity);
+		return now;
+	});
+	run.shadows.drop();
 }
 
-/// Tells what is found for the first time.
-void IntegrationMonitor::act() {
-	for (int kind = 0; kind < ::dembark::monitor_kinds; ++kind) {
-		if (state.said >> kind & 1 || !finding(monitor.row, monitor.settings, kind)) continue;
-		state.said |= 1 << kind;
-		const std::string line = "IntegrationMonitor: at step " + std::to_string(scene->iter) + ' ' +
-		                         finding_text(monitor.row, monitor.settings, kind, "body");
-		if (monitor.settings.action == MonitorAction::stop) fail(line, 1);
-		dembark_yade::warn(line);
-	}
-}
-
-void IntegrationMonitor::endRow(const NewtonIntegrator& newton) {
-	state.level = adapted_level(monitor.row, monitor.settings, state.level);
-	monitor.close_row();
-	const Real before = scene->dt, now = std::ldexp(state.step, -state.level);
-	if (now != before) {
-		// The velocities are those of half a step of the old length before; the integrator makes a kick of the new length.
-		for (const auto& body : *scene->bodies) {
-			if (!body || !judged(*body, newton)) continue;
-			auto&          own  = *body->state;
-			const Vector3r push = scene->forces.getForce(body->getId()) / own.mass + newton.gravity;
-			const Vector3r turn = scene->forces.getTorque(body->getId()).cwiseQuotient(own.inertia);
-			for (int k = 0; k < 3; ++k) {
-				if (!(own.blockedDOFs >> k & 1)) own.vel[k] += 0.5 * (before - now) * push[k];
-				if (!(own.blockedDOFs >> (k + 3) & 1)) own.angVel[k] += 0.5 * (before - now) * turn[k];
-			}
+/// The velocities are those of half a step of the old length before; the integrator makes a kick of the new length.
+void IntegrationMonitor::shorten(const NewtonIntegrator& newton, Real now) {
+	const Real before = scene->dt;
+	for (const auto& body : *scene->bodies) {
+		if (!body || !judged(*body, newton)) continue;
+		auto&          own  = *body->state;
+		const Vector3r push = scene->forces.getForce(body->getId()) / own.mass + newton.gravity;
+		const Vector3r turn = scene->forces.getTorque(body->getId()).cwiseQuotient(own.inertia);
+		for (int k = 0; k < 3; ++k) {
+			if (!(own.blockedDOFs >> k & 1)) own.vel[k] += 0.5 * (before - now) * push[k];
+			if (!(own.blockedDOFs >> (k + 3) & 1)) own.angVel[k] += 0.5 * (before - now) * turn[k];
 		}
-		scene->dt = now;
-		histories.clear();
 	}
-	state.nextRow = scene->iter + (rows << state.level);
+	scene->dt = now;
+	histories.clear();
 }
 
-void IntegrationMonitor::preSave(IntegrationMonitor&) {
-	Sums now = state;
-	now.run  = monitor.run;
-	now.row  = monitor.row;
-	static_assert(sizeof now % sizeof(Real) == 0 && sizeof(Shadow) % sizeof(Real) == 0, "whole numbers of numbers");
-	saved.resize((sizeof now + shadows.size() * sizeof(Shadow)) / sizeof(Real));
-	std::memcpy(saved.data(), &now, sizeof now);
-	if (!shadows.empty()) std::memcpy(saved.data() + sizeof now / sizeof(Real), shadows.data(), shadows.size() * sizeof(Shadow));
-}
+void IntegrationMonitor::preSave(IntegrationMonitor&) { saved = run.saved({run.state()}); }
 
 void IntegrationMonitor::postLoad(IntegrationMonitor&) {
-	constexpr std::size_t numbers = sizeof state / sizeof(Real), each = sizeof(Shadow) / sizeof(Real);
-	if (saved.size() < numbers) return;
-	std::memcpy(static_cast<void*>(&state), saved.data(), sizeof state);
-	shadows.resize((saved.size() - numbers) / each);
-	if (!shadows.empty()) std::memcpy(static_cast<void*>(shadows.data()), saved.data() + numbers, shadows.size() * sizeof(Shadow));
-	monitor.run = state.run;
-	monitor.row = state.row;
+	if (!saved.empty()) run.restore(reinterpret_cast<const char*>(saved.data()));
 	saved.clear();
 }
 
 void IntegrationMonitor::reset() {
-	state   = {};
-	monitor = {};
+	run = MonitorRun();
 	histories.clear();
-	shadows.clear();
 	step = -1;
 }
 
-boost::python::dict IntegrationMonitor::figures() const {
-	const MonitorTally  all = monitor.all();
+boost::python::dict IntegrationMonitor::figures() {
 	boost::python::dict out;
-	const auto          put = [&out](const std::string& kind, const ::dembark::ErrorTally& e) {
-		out[kind]               = e.largest;
-		out[kind + "_rms"]      = e.rms();
-		out[kind + "_body"]     = e.body;
-		out[kind + "_exceeded"] = e.exceeded;
-	};
-	put("position", all.errors.position);
-	put("velocity", all.errors.velocity);
-	put("spin", all.errors.spin);
-	out["judged"]         = all.errors.position.count;
-	out["contact_steps"]  = std::isinf(all.contact.steps) ? 0.0 : all.contact.steps;
-	out["contact_body_1"] = all.contact.one;
-	out["contact_body_2"] = all.contact.two;
-	out["impacts"]        = all.impacts.count;
-	out["impact"]         = all.impacts.largest;
-	out["impact_rms"]     = all.impacts.rms();
-	out["impact_body"]    = all.impacts.body;
-	out["length"]         = state.length;
-	out["speed"]          = speed;
+	for (std::size_t k = 0; k < MonitorRun::figure_names.size(); ++k) {
+		const std::string name  = MonitorRun::figure_names[k];
+		const Real        value = run.figure(int(k), step);
+		if (name.find("body") != std::string::npos) out[name] = long(value);
+		else if (k < std::size_t(MonitorRun::energy_error) || k > 19) out[name] = value;
+	}
+	out["length"] = run.monitor.settings.scales.length;
+	out["speed"]  = speed;
 	return out;
 }
 

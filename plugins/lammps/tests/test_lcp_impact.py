@@ -60,6 +60,12 @@ def test_other_run_styles_are_refused(tmp_path):
     assert "run_style respa is not supported; use run_style verlet" in refused(tmp_path, after="run_style respa 1")
 
 
+def test_bodies_of_several_grains_are_refused(tmp_path):
+    """Their forces would move the grains one by one."""
+    line = refused(tmp_path, after="fix stiff all rigid/nve single")
+    assert "it knows single grains, and fix stiff (rigid/nve) moves bodies made of several" in line
+
+
 def test_restart_files_that_do_not_fit(tmp_path):
     run(tmp_path, pile(steps=200), run="run 200\nwrite_restart here.restart")
     case = pile(steps=200)

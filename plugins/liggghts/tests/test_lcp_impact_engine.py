@@ -159,6 +159,12 @@ def test_forces_after_the_contact_forces_are_refused(tmp_path):
     assert "fix push (addforce) may add forces after the contact forces are known; define it before this fix" in line
 
 
+def test_bodies_of_several_grains_are_refused(tmp_path):
+    """Their forces would move the grains one by one."""
+    line = refused(tmp_path, after="fix stiff all multisphere")
+    assert "it knows single grains, and fix stiff (multisphere) moves bodies made of several" in line
+
+
 def test_restart_files_that_do_not_fit(tmp_path):
     run(tmp_path, pile(steps=200), run="run 200\nwrite_restart here.restart")
     case = pile(steps=200)

@@ -1,6 +1,7 @@
 // Impacts under MPI: the first rank gathers what all have, solves, and hands the forces out. Forces are the same to the bit however many
 // ranks there are, and whatever each of them would compute.
-#pragma once
+#ifndef DEMBARK_FIRST_RANK_H
+#define DEMBARK_FIRST_RANK_H
 
 #include <mpi.h>
 
@@ -11,10 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "archive.hpp"
+#include "dembark/impact/archive.hpp"
 
-namespace dembark {
-namespace impact {
+namespace dembark_family {
 
 /// All members are collective.
 class FirstRank {
@@ -60,12 +60,12 @@ class FirstRank {
       wrong = e.what();
     }
     if (ranks_ == 1) return wrong;
-    std::vector<double> shared = to_numbers(record);
+    std::vector<double> shared = dembark::impact::to_numbers(record);
     shared.push_back(double(wrong.size()));
     MPI_Bcast(shared.data(), int(shared.size()), MPI_DOUBLE, 0, world_);
     wrong.resize(std::size_t(shared.back()));
     shared.pop_back();
-    from_numbers(shared, record);
+    dembark::impact::from_numbers(shared, record);
     if (!wrong.empty()) MPI_Bcast(wrong.data(), int(wrong.size()), MPI_CHAR, 0, world_);
     return wrong;
   }
@@ -82,5 +82,6 @@ class FirstRank {
   std::vector<int> counts_, offsets_;  ///< of the last gather, on the first rank
 };
 
-}  // namespace impact
-}  // namespace dembark
+}  // namespace dembark_family
+
+#endif
