@@ -84,7 +84,7 @@ void bind_impact(nb::module_& m) {
              settings.friction_sweeps = sweeps;
              settings.lcp.method = lcp_method(method);
              settings.materials = rows<Material>(materials);
-             settings.pairs = rows<PairLaw>(pairs);
+             settings.pairs = rows<ImpactPairLaw>(pairs);
              Scene* scene = new (self) Scene(settings, rows<Body>(bodies));
              scene->reach = reach;
              scene->row = row;

@@ -108,6 +108,7 @@ private:
 	void                        gatherWalls();
 	void                        addShape(const Body&, const ::dembark::impact::Wall&, std::vector<::dembark::Triangle>&);
 	void                        findContacts(double reach, std::vector<::dembark::impact::Contact>&);
+	::dembark::impact::Settings commonSettings() const;
 	::dembark::impact::Settings settings() const;
 	void                        prepare();
 	void                        moveBack() const;

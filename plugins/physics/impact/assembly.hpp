@@ -33,7 +33,7 @@ struct ContactHistory;
 struct Row : Contact {
   int memory = -1;                         ///< index into what is remembered, or -1
   const ContactHistory* before = nullptr;  ///< what is known of it, maybe by another name; see history.hpp
-  const PairLaw* law = nullptr;
+  const ImpactPairLaw* law = nullptr;
   double stiffness = 0.0;           ///< s, N/m, both springs in series
   double viscous = 0.0;             ///< c / tau, N/m
   double compliance = 0.0;          ///< 1 / (s + c/tau), m/N
@@ -133,7 +133,7 @@ class Assembly {
     }
   }
 
-  static Springs springs_of(const Contact& c, double stiffness_a, double stiffness_b, const PairLaw& law, double dt) {
+  static Springs springs_of(const Contact& c, double stiffness_a, double stiffness_b, const ImpactPairLaw& law, double dt) {
     const double soft_a = 1.0 / stiffness_a, soft_b = 1.0 / stiffness_b;
     if (!(soft_b >= 0.0) || std::isinf(soft_b)) refuse(c, "the wall's stiffness must be > 0 N/m");
     Springs s;

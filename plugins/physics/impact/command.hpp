@@ -88,8 +88,8 @@ class CommandReader : keywords::Reader {
              "inertia, impacts, method, sweeps");
   }
 
-  PairLaw law(const Friction& friction) const {
-    PairLaw law = law_;
+  ImpactPairLaw law(const Friction& friction) const {
+    ImpactPairLaw law = law_;
     law.friction = friction;
     law.friction.interface_shear_strength = strength_;
     return law;
@@ -118,7 +118,7 @@ class CommandReader : keywords::Reader {
     return f;
   }
   static Friction no_friction() {
-    Friction f = PairLaw::frictionless();
+    Friction f = ImpactPairLaw::frictionless();
     f.critical_slip_distance = 0.0;
     return f;
   }
@@ -181,7 +181,7 @@ class CommandReader : keywords::Reader {
   const char* const mesh_;  ///< what names a mesh; nullptr: the engine has none
   Command command_;
   std::vector<double> stiffness_, damping_;
-  PairLaw law_;  ///< but for its friction
+  ImpactPairLaw law_;  ///< but for its friction
   Friction friction_ = no_friction();
   double strength_ = unlimited_strength;                               ///< Pa
   std::vector<std::pair<double, std::optional<Friction>>> wall_laws_;  ///< stiffness, N/m, and friction; none: that of the fix

@@ -90,7 +90,7 @@ struct Material {
 };
 
 /// Of a pair of materials. The default is without friction.
-struct PairLaw {
+struct ImpactPairLaw {
   FinnieRabinowicz friction = frictionless();
   double tangential_stiffness_ratio = 2.0 / 7.0;  ///< tangential stiffness over the normal stiffness of the contact, > 0
   double contact_damping = 0.0;  ///< c, N s/m, >= 0, on the deformation of the contact: Galilean invariant; times the ratio along it
@@ -114,12 +114,12 @@ struct Settings {
   int friction_sweeps = 2;  ///< >= 1: friction and normal forces are computed in turn so many times a step
   LcpOptions lcp{};
   std::vector<Material> materials = std::vector<Material>(1);
-  std::vector<PairLaw> pairs = std::vector<PairLaw>(1);  ///< n x n, row by row, symmetric, n = number of materials
+  std::vector<ImpactPairLaw> pairs = std::vector<ImpactPairLaw>(1);  ///< n x n, row by row, symmetric, n = number of materials
 
   /// Appends a material with the same law against all others and itself; a wall is a material of its own.
-  void add(const Material& material, const PairLaw& law) {
+  void add(const Material& material, const ImpactPairLaw& law) {
     const std::size_t n = materials.size();
-    std::vector<PairLaw> wider((n + 1) * (n + 1), law);
+    std::vector<ImpactPairLaw> wider((n + 1) * (n + 1), law);
     for (std::size_t i = 0; i < n; ++i) std::copy_n(pairs.begin() + std::ptrdiff_t(i * n), n, wider.begin() + std::ptrdiff_t(i * (n + 1)));
     pairs.swap(wider);
     materials.push_back(material);
@@ -210,6 +210,7 @@ inline std::string settings_error(const Settings& s) {
   must(s.dt > 0.0 && std::isfinite(s.dt), "time step must be > 0 s and finite", s.dt);
   must(s.theta >= 0.5 && s.theta <= 1.0, "theta must lie between 0.5 and 1", s.theta);
   must(s.friction_sweeps >= 1, "friction sweeps must be >= 1", s.friction_sweeps);
+  must(s.lcp.tolerance > 0.0 && s.lcp.tolerance < 1.0, "tolerance must lie between 0 and 1", s.lcp.tolerance);
   const std::size_t n = s.materials.size();
   if (error.empty() && n == 0) return "at least one material is needed";
   must(s.pairs.size() == n * n, std::to_string(n) + " materials need " + std::to_string(n * n) + " pair laws", s.pairs.size());
@@ -220,7 +221,7 @@ inline std::string settings_error(const Settings& s) {
     must(m.damping >= 0.0 && std::isfinite(m.damping), which + "damping must be >= 0 N s/m and finite", m.damping);
   }
   for (std::size_t k = 0; error.empty() && k < n * n; ++k) {
-    const PairLaw& p = s.pairs[k];
+    const ImpactPairLaw& p = s.pairs[k];
     const double ratio = p.tangential_stiffness_ratio;
     const std::string which = "materials " + std::to_string(k / n) + " and " + std::to_string(k % n) + ": ";
     if (p.friction.error()) return which + p.friction.error();

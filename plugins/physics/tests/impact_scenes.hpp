@@ -12,7 +12,7 @@ namespace impact_scenes {
 
 using dembark::Vec3;
 using dembark::impact::Body;
-using dembark::impact::PairLaw;
+using dembark::impact::ImpactPairLaw;
 using dembark::impact::Settings;
 
 constexpr double g = 9.81;
@@ -22,8 +22,8 @@ inline Settings two_materials(double dt, double theta, double mu, double contact
   s.dt = dt;
   s.theta = theta;
   s.materials = {{1e7, 0.0}, {5e7, 0.0}};
-  s.pairs.assign(4, PairLaw());
-  for (PairLaw& p : s.pairs) {
+  s.pairs.assign(4, ImpactPairLaw());
+  for (ImpactPairLaw& p : s.pairs) {
     p.friction.static_friction = p.friction.kinetic_friction = mu;
     p.contact_damping = contact_damping;
   }

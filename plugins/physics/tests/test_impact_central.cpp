@@ -31,8 +31,8 @@ Settings settings(double dt, double theta, std::vector<double> stiffness = {1e7}
   s.theta = theta;
   s.materials.clear();
   for (const double k : stiffness) s.materials.push_back({k, damping});
-  s.pairs.assign(stiffness.size() * stiffness.size(), PairLaw());
-  for (PairLaw& p : s.pairs) p.contact_damping = contact_damping;
+  s.pairs.assign(stiffness.size() * stiffness.size(), ImpactPairLaw());
+  for (ImpactPairLaw& p : s.pairs) p.contact_damping = contact_damping;
   return s;
 }
 

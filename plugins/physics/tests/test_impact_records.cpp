@@ -17,17 +17,17 @@ using namespace dembark::impact;
 using namespace impact_scenes;
 
 TEST_CASE("a table of materials that differs in the two orders of a pair is refused, whichever parameter it is") {
-  using Change = std::function<void(PairLaw&)>;
+  using Change = std::function<void(ImpactPairLaw&)>;
   const std::vector<Change> changes = {
-      [](PairLaw& p) { p.friction.static_friction = 0.7; },
-      [](PairLaw& p) { p.friction.kinetic_friction = 0.3; },
-      [](PairLaw& p) { p.friction.critical_slip_distance = 2e-5; },
-      [](PairLaw& p) { p.friction.interface_shear_strength = 1e6; },
-      [](PairLaw& p) { p.friction.healing_time = 0.1; },
-      [](PairLaw& p) { p.friction.presliding = Presliding::exponential; },
-      [](PairLaw& p) { p.tangential_stiffness_ratio = 0.5; },
-      [](PairLaw& p) { p.contact_damping = 10.0; },
-      [](PairLaw& p) { p.contact_area = 1e-4; },
+      [](ImpactPairLaw& p) { p.friction.static_friction = 0.7; },
+      [](ImpactPairLaw& p) { p.friction.kinetic_friction = 0.3; },
+      [](ImpactPairLaw& p) { p.friction.critical_slip_distance = 2e-5; },
+      [](ImpactPairLaw& p) { p.friction.interface_shear_strength = 1e6; },
+      [](ImpactPairLaw& p) { p.friction.healing_time = 0.1; },
+      [](ImpactPairLaw& p) { p.friction.presliding = Presliding::exponential; },
+      [](ImpactPairLaw& p) { p.tangential_stiffness_ratio = 0.5; },
+      [](ImpactPairLaw& p) { p.contact_damping = 10.0; },
+      [](ImpactPairLaw& p) { p.contact_area = 1e-4; },
   };
   for (const Change& change : changes) {
     Settings s = two_materials(1e-4, 1.0, 0.5);
@@ -41,7 +41,7 @@ TEST_CASE("a table of materials that differs in the two orders of a pair is refu
 
 TEST_CASE("a material that is added has its law against all others, and theirs stay") {
   Settings s = two_materials(1e-4, 1.0, 0.4);
-  PairLaw wall;
+  ImpactPairLaw wall;
   wall.friction.static_friction = wall.friction.kinetic_friction = 0.2;
   s.add({3e7, 5.0}, wall);
   REQUIRE(settings_error(s).empty());

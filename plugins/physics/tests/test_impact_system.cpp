@@ -22,8 +22,8 @@ Settings three_materials(double dt, double theta, double mu, double damping = 0.
   s.dt = dt;
   s.theta = theta;
   s.materials = {{1e7, damping}, {2e7, damping}, {1e7, 0.0}};
-  s.pairs.assign(9, PairLaw());
-  for (PairLaw& p : s.pairs) {
+  s.pairs.assign(9, ImpactPairLaw());
+  for (ImpactPairLaw& p : s.pairs) {
     p.friction.static_friction = mu;
     p.friction.kinetic_friction = 0.8 * mu;
     p.friction.critical_slip_distance = 1e-4;
