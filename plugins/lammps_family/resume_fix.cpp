@@ -119,13 +119,7 @@ void ResumeFix::cut_outputs() {
   std::fflush(nullptr);
   if (comm->me != 0) return;
   try {
-    for (const std::string& path : outputs_) {
-      if (!states::can_append(path)) continue;
-      const auto known = std::find_if(saved_.files.begin(), saved_.files.end(), [&](const auto& file) { return file.path == path; });
-      const std::string what =
-          known == saved_.files.end() ? states::cut_output(path, step) : states::cut_output(*known, step, !cut_exactly_);
-      if (!what.empty()) say("dembark: " + what + "\n");
-    }
+    for (const std::string& line : states::cut_outputs(outputs_, saved_.files, step, step, !cut_exactly_)) say("dembark: " + line + "\n");
   } catch (const std::exception& wrong) {
     fail_alone(wrong.what());
   }

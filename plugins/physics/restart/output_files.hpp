@@ -148,6 +148,20 @@ inline std::string cut_output(const OutputFile& file, long long step, bool keep)
   return shorten(file.path, file.bytes, step, keep);
 }
 
+/// Cut the files at `paths` that can be appended to: those that are known from the state of `step` to their length then, and the others
+/// behind the rows and frames of step `last`. `keep`: as in shorten(). What there is to say, a line each.
+inline std::vector<std::string> cut_outputs(const std::vector<std::string>& paths, const std::vector<OutputFile>& known, long long step,
+                                            long long last, bool keep) {
+  std::vector<std::string> lines;
+  for (const std::string& path : paths) {
+    if (!can_append(path)) continue;
+    const auto found = std::find_if(known.begin(), known.end(), [&](const OutputFile& file) { return file.path == path; });
+    const std::string line = found == known.end() ? cut_output(path, last) : cut_output(*found, step, keep);
+    if (!line.empty()) lines.push_back(line);
+  }
+  return lines;
+}
+
 /// Give a file that cannot be appended to another name, cut to its length in the state if it is known and not packed. What there is to say,
 /// or nothing.
 inline std::string keep_unappendable(const std::string& path, const std::vector<OutputFile>& known, long long step) {

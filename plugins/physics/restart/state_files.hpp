@@ -1,8 +1,8 @@
 // States of a run on disk: written whole or not at all, the last two kept, and the newest whole one found again.
 //
-// A state BASE.<step>.restart counts when BASE.<step>.restart.crc beside it names its size and its CRC-32; the mark is written last. It
-// also names the grid of processors, which the engine would choose anew by the shape that the box has by then. What goes wrong is thrown as
-// std::runtime_error with one line.
+// A state BASE.<step>.restart, or with another ending, counts when BASE.<step>.restart.crc next to it names its size and its CRC-32; the
+// mark is written last. It also names the grid of processors, which the engine would choose anew by the shape that the box has by then.
+// What goes wrong is thrown as std::runtime_error with one line.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,9 @@ struct State {
 
 inline constexpr const char *state_end = ".restart", *mark_end = ".crc";
 
-inline std::string state_name(const std::string& base, long long step) { return base + "." + std::to_string(step) + state_end; }
+inline std::string state_name(const std::string& base, long long step, const char* ending = state_end) {
+  return base + "." + std::to_string(step) + ending;
+}
 
 /// The whole number that `text` begins with; 0 where it begins with none.
 inline long long leading_number(const std::string& text) { return std::strtoll(text.c_str(), nullptr, 10); }
@@ -64,23 +66,23 @@ inline fs::path folder_of(const std::string& base) {
 }
 
 /// Steps of all files that are named like a state, the newest first.
-inline std::vector<long long> all_states(const std::string& base) {
+inline std::vector<long long> all_states(const std::string& base, const char* ending = state_end) {
   const std::string own = fs::path(base).filename().string();
   std::vector<long long> steps;
   std::error_code unreadable;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_of(base), unreadable)) {
     const std::string name = entry.path().filename().string();
     const long long step = leading_number(name.substr(std::min(own.size() + 1, name.size())));
-    if (name == state_name(own, step)) steps.push_back(step);
+    if (name == state_name(own, step, ending)) steps.push_back(step);
   }
   std::sort(steps.rbegin(), steps.rend());
   return steps;
 }
 
 /// The newest state that is whole.
-inline State newest_state(const std::string& base) {
-  for (const long long step : all_states(base)) {
-    const std::string path = state_name(base, step);
+inline State newest_state(const std::string& base, const char* ending = state_end) {
+  for (const long long step : all_states(base, ending)) {
+    const std::string path = state_name(base, step, ending);
     std::ifstream mark(path + mark_end);
     long long bytes = 0;
     std::uint32_t crc = 0;
@@ -93,15 +95,15 @@ inline State newest_state(const std::string& base) {
 }
 
 /// Delete all states, whole or not, but the newest `kept`.
-inline void delete_states(const std::string& base, std::size_t kept) {
-  const std::vector<long long> steps = all_states(base);
+inline void delete_states(const std::string& base, std::size_t kept, const char* ending = state_end) {
+  const std::vector<long long> steps = all_states(base, ending);
   for (std::size_t k = kept; k < steps.size(); ++k)
-    for (const char* const end : {mark_end, ""}) std::remove((state_name(base, steps[k]) + end).c_str());
+    for (const char* const end : {mark_end, ""}) std::remove((state_name(base, steps[k], ending) + end).c_str());
 }
 
 /// Make the finished file `part` to a state, mark it, and delete all but the last two.
-inline void keep_state(const std::string& part, const std::string& base, const State& state) try {
-  const std::string path = state_name(base, state.step), mark = path + mark_end, mark_part = mark + ".part", sum = check_sum(part);
+inline void keep_state(const std::string& part, const std::string& base, const State& state, const char* ending = state_end) try {
+  const std::string path = state_name(base, state.step, ending), mark = path + mark_end, mark_part = mark + ".part", sum = check_sum(part);
   if (sum.empty()) fail_file(part, "read");
   sync_file(part);
   fs::remove(mark);
@@ -113,7 +115,7 @@ inline void keep_state(const std::string& part, const std::string& base, const S
   sync_file(mark_part);
   fs::rename(mark_part, mark);
   sync_file(folder_of(base));
-  delete_states(base, 2);
+  delete_states(base, 2, ending);
 } catch (const fs::filesystem_error& error) {
   fail_file(error.path2().empty() ? error.path1() : error.path2(), "written", error.code());
 }

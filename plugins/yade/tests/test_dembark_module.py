@@ -144,24 +144,24 @@ def test_output_files_are_cut_behind_the_state_or_left(yade):
     """To their length in the state; by their format if the state does not know them; never when their rows do not begin with the step."""
     frame = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\nITEM: ATOMS id\n7\n"
     files = {"grains.dump": "".join(frame.format(n) for n in (0, 50, 100)), "half.csv": "step,x\n0,1\n50,2\n10",
-             "known.txt": "no step\nat all\n", "means.txt": "# Means\n# TimeStep x\n50 1\n100 2\n", "other.txt": "no step\nat all\n",
-             "short.txt": "x", "table.csv": "step,x\n0,1\n50,2\n100,3\n150,4\n", "times.csv": "time,x\n0,1\n1,2\n"}
+             "known.txt": "no step\nat all\n", "means.txt": "# Means\n# TimeStep x\n50 1\n100 2\n", "other.txt": "two steps\nat all\n",
+             "short.txt": "x", "table.csv": "step,x\n0,1\n50,2\n100,3\n150,4\n", "times.csv": "time,x\n0.5,1\n1.5,2\n"}
     for name, text in files.items():
         (yade.folder / name).write_text(text)
     done = yade(script(yade, "cuts", f"""
-        from yade.dembark import states
-        same = states._sum_before("known.txt", 8)
-        known = {{"known.txt": ["", 8, same], "short.txt": ["", 8, same], "other.txt": ["", 8, 1]}}
-        for name in {list(files)}:
-            states._cut(name, 100, known.get(name))
+        open("then.txt", "w").write("no step\\n")
+        record = DembarkStates.record(["then.txt"])
+        known = "".join(record.replace("then.txt", name) for name in ("known.txt", "short.txt", "other.txt"))
+        for line in DembarkStates.cut({list(files)}, known, 100):
+            print(line)
         print("done")
         """))
     assert "done" in done.stdout, done.stderr
     found = {name: (yade.folder / name).read_text() for name in files}
     cut = {"grains.dump": frame.format(0) + frame.format(50), "half.csv": "step,x\n0,1\n50,2\n", "known.txt": "no step\n",
-           "table.csv": "step,x\n0,1\n50,2\n"}
+           "means.txt": "# Means\n# TimeStep x\n50 1\n", "table.csv": "step,x\n0,1\n50,2\n"}
     assert found == files | cut
-    left = [line.split()[2] for line in done.stdout.splitlines() if "is left as it is" in line]
+    left = [line.split()[1] for line in done.stdout.splitlines() if "is left as it is" in line]
     assert left == [name for name in files if name not in cut]
 
 

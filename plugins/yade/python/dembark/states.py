@@ -1,21 +1,17 @@
 """Runs with states to resume from: whole or not at all, and equal to the bit to a run that was not interrupted, on one thread."""
 
-import glob
 import gzip
 import json
 import os
-import re
 import shutil
 import sys
 import zlib
 from functools import cache
 
-from yade import IntegrationMonitor, NewtonIntegrator, Omega, Sphere
+from yade import DembarkStates, IntegrationMonitor, NewtonIntegrator, Omega, Sphere
 from yade.dembark.report import announce, fail, finish, monitor
 
 O = Omega()
-_KEPT_STATES = 2
-_SUMMED_BYTES = 1 << 16
 
 
 @cache
@@ -33,36 +29,6 @@ def options():
     return int(every), resume == "yes"
 
 
-def _sync(path):
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def _check_sum(path):
-    crc, size = 0, 0
-    with open(path, "rb") as file:
-        while block := file.read(1 << 20):
-            crc, size = zlib.crc32(block, crc), size + len(block)
-    return f"{size} {crc:08x}"
-
-
-def _states(base):
-    """Steps and files of all saved states `base`.<step>.yade.gz, the newest first."""
-    found = ((re.fullmatch(re.escape(base) + r"\.(\d+)\.yade\.gz", path), path) for path in glob.glob(glob.escape(base) + ".*.yade.gz"))
-    return sorted(((int(match.group(1)), path) for match, path in found if match), reverse=True)
-
-
-def _is_whole(path):
-    try:
-        with open(path + ".crc", encoding="ascii") as mark:
-            return mark.read().strip() == _check_sum(path)
-    except (OSError, ValueError):
-        return False
-
-
 def _can_be_read(path):
     """Whether a packed file ends as it should."""
     try:
@@ -74,116 +40,17 @@ def _can_be_read(path):
     return True
 
 
-def _number(line):
-    """The integer >= 0 that is the first field of a line; None when that is something else."""
-    found = re.match(rb"\d+(?=[,\s])", line)
-    return int(found.group()) if found else None
-
-
 def _save(base, outputs):
-    """Save the scene as `base`.<step>.yade.gz: whole or not at all, and marked with its check sum when it is; keep the last two."""
-    path = f"{base}.{O.iter}.yade.gz"
+    """Save the scene as `base`.<step>.yade.gz: complete or not at all, with its check sum next to it; keep the last two."""
     part = f"{base}.part.yade.gz"
-    O.tags["dembark_outputs"] = json.dumps([_known(name) for name in outputs if os.path.isfile(name)], separators=(",", ":"))
+    O.tags["dembark_outputs"] = json.dumps(DembarkStates.record(list(outputs)))
     # YADE would try for ever to write on a full disk. A packed body with its contacts takes about 150 bytes.
-    if shutil.disk_usage(os.path.dirname(path) or ".").free < 1000 * len(O.bodies) + (1 << 20):
-        fail(f"file {path} cannot be written: No space left on the disk")
+    if shutil.disk_usage(os.path.dirname(part) or ".").free < 1000 * len(O.bodies) + (1 << 20):
+        fail(f"file {part} cannot be written: No space left on the disk")
     O.save(part, quiet=True)
     if not _can_be_read(part):
         fail(f"file {part} could not be written whole. No space left on the disk?")
-    for name in (*filter(os.path.isfile, outputs), part):
-        _sync(name)
-    if os.path.exists(path + ".crc"):
-        os.unlink(path + ".crc")
-    os.replace(part, path)
-    with open(path + ".crc.part", "w", encoding="ascii") as mark:
-        mark.write(_check_sum(path) + "\n")
-    _sync(path + ".crc.part")
-    os.replace(path + ".crc.part", path + ".crc")
-    _sync(os.path.dirname(path) or ".")
-    _forget(_states(base)[_KEPT_STATES:])
-
-
-def _forget(states):
-    for _, path in states:
-        for name in (path + ".crc", path):
-            if os.path.exists(name):
-                os.unlink(name)
-
-
-def _known(path):
-    """A file by its name, its length and a check sum of its last bytes."""
-    size = os.path.getsize(path)
-    return [path, size, _sum_before(path, size)]
-
-
-def _sum_before(path, end):
-    with open(path, "rb") as file:
-        file.seek(max(0, end - _SUMMED_BYTES))
-        return zlib.crc32(file.read(min(end, _SUMMED_BYTES)))
-
-
-def _cut(path, step, known):
-    """Cut `path` to its length in the state, or else, if the state does not know it, before the first row or frame at or after `step`.
-
-    A file that cannot be cut so is left as it is, with one line that says why.
-    """
-    if not os.path.isfile(path):
-        return
-    if known:
-        end = known[1] if os.path.getsize(path) >= known[1] and _sum_before(path, known[1]) == known[2] else None
-    else:
-        end = _end_before(path, step)
-    if end is None:
-        why = f"another one than at step {step}" if known else "not a dump, nor a table whose first column is the step"
-        print(f"dembark: file {path} is left as it is: it is {why}; look for what stands there twice", flush=True)
-    else:
-        os.truncate(path, end)
-
-
-def _end_before(path, step):
-    """Bytes of a dump or a table before the first row or frame at or after `step`, or the first that is not complete; None: unknown."""
-    with open(path, "rb") as file:
-        first = file.readline()
-        if first == b"ITEM: TIMESTEP\n":
-            return _end_of_frames(file, step)
-        if re.match(rb"[#\s\"]*step[\"\s,]", first, re.IGNORECASE):
-            return _end_of_rows(file, step)
-    return None
-
-
-def _end_of_frames(file, step):
-    end, last = 0, -1
-    while (text := file.readline()).endswith(b"\n"):
-        now = _number(text)
-        if now is None or now < last:
-            return None
-        last = now
-        file.readline()
-        rows = _number(file.readline())
-        if now >= step or rows is None or sum(file.readline().endswith(b"\n") for _ in range(rows + 5)) < rows + 5:
-            break
-        end, line = file.tell(), file.readline()
-        if not line.endswith(b"\n"):
-            break
-        if line != b"ITEM: TIMESTEP\n":
-            return None
-    return end
-
-
-def _end_of_rows(file, step):
-    end, cut, last = file.tell(), None, -1
-    for line in file:
-        if not line.endswith(b"\n"):
-            break
-        now = _number(line)
-        if now is None or now <= last:
-            return None
-        last = now
-        if now >= step and cut is None:
-            cut = end
-        end += len(line)
-    return end if cut is None else cut
+    DembarkStates.keep(part, base, O.iter)
 
 
 def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.csv", "grains.dump", "contacts.dump"), base="state",
@@ -203,24 +70,23 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
     restart_every = given[0] if restart_every is None else restart_every
     resume = given[1] if resume is None else resume
     if resume:
-        whole = [path for _, path in _states(base) if _is_whole(path)]
-        if not whole:
+        step = DembarkStates.newest(base)
+        if step < 0:
             fail(f"resume=yes: there is no whole state {base}.<step>.yade.gz in this folder; start with restart_every > 0 first")
-        O.load(whole[0], quiet=True)
-        known = {one[0]: one for one in json.loads(O.tags["dembark_outputs"] if O.tags.has_key("dembark_outputs") else "[]")}
-        for path in outputs:
-            _cut(path, O.iter, known.get(path))
+        O.load(f"{base}.{step}.yade.gz", quiet=True)
+        for line in DembarkStates.cut(list(outputs), json.loads(O.tags["dembark_outputs"]), O.iter):
+            print(f"dembark: {line}", flush=True)
         exact = "exactly" if O.numThreads == 1 else f"approximately: sums of {O.numThreads} threads round differently each time"
         print(f"dembark: resumed at step {O.iter} {exact}", flush=True)
         if loaded:
             loaded()
     elif restart_every:
         # They could be mixed up later with those of this run.
-        found = _states(base)
-        whole = [path for _, path in found if _is_whole(path)]
-        if whole:
-            fail(f"there is a state of an earlier run, {whole[0]}; go on from it by resume=yes, move it away, or use another folder")
-        _forget(found)
+        step = DembarkStates.newest(base)
+        if step >= 0:
+            fail(f"there is a state of an earlier run, {base}.{step}.yade.gz; go on from it by resume=yes, move it away, or use another "
+                 "folder")
+        DembarkStates.remove(base)
     watch()
     # The last row and frame are written in the step that starts from their state.
     end = steps + 1
