@@ -59,9 +59,10 @@ for file in "$here"/plugins/liggghts/fix_{energy_account,wall_motion}*; do
   copy "$file" "$src/$(basename "$file")"
 done
 # Fluids, walls and bodies.
-for file in "$here"/plugins/liggghts/{pair_sph_coupled,pair_sph_options,fix_nve_sph_coupled,fix_sph_body,fix_sph_contact,sph_films,sph_rows,sph_loops_avx2}*; do
+for file in "$here"/plugins/liggghts/{pair_sph_coupled,pair_sph_options,fix_nve_sph_coupled,fix_sph_body,fix_sph_contact,sph_films,sph_rows}*; do
   copy "$file" "$src/$(basename "$file")"
 done
+copy "$here/plugins/physics/sph/loops_avx2.cpp" "$src/sph_loops_avx2.cpp"
 # States to resume from.
 for file in "$here"/plugins/liggghts/{fix_resume_exact*,exact_fixes.h,per_instance.h}; do
   copy "$file" "$src/$(basename "$file")"
@@ -70,7 +71,7 @@ done
 eigen=$(pkg-config --cflags eigen3 2>/dev/null || true)
 [ -n "$eigen" ] || { [ -d /usr/include/eigen3/Eigen ] && eigen=-I/usr/include/eigen3; }
 if [ -n "$eigen" ]; then
-  for file in "$here"/plugins/liggghts/fix_lcp_*.{h,cpp} "$here"/plugins/liggghts/mesh_triangles.h "$family"/impact_fix.{h,cpp}; do
+  for file in "$here"/plugins/liggghts/fix_lcp_*.{h,cpp} "$here"/plugins/liggghts/mesh_triangles.h "$family"/{impact_fix.h,impact_fix.cpp,first_rank.h}; do
     copy "$file" "$src/$(basename "$file")"
   done
 else

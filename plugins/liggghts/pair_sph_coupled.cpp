@@ -231,7 +231,7 @@ void PairSphCoupled::resize() {
   sum_.resize(n);
   velocity_.resize(n);
   velocity_sum_.resize(n);
-  met_.resize(n);
+  wall_velocity_.resize(n);
   if (settings_.shifting.coefficient > 0.0) shift_sum_.resize(n);
   records_.back() = far_record(vector(domain->boxhi) + Vector{1e3 * (domain->xprd + settings_.h()), 0.0, 0.0});
 }
@@ -294,7 +294,7 @@ int PairSphCoupled::pack_comm(int n, int *numbers, double *to, int, int *) {
     const int i = numbers[k];
     if (walls_to_ghosts_) {
       *at++ = atom->p[i];
-      *at++ = met_[i].x, *at++ = met_[i].y, *at++ = met_[i].z;
+      *at++ = wall_velocity_[i].x, *at++ = wall_velocity_[i].y, *at++ = wall_velocity_[i].z;
     } else {
       *at++ = atom->rho[i];
     }
@@ -310,7 +310,7 @@ void PairSphCoupled::unpack_comm(int n, int first, double *from) {
       continue;
     }
     const double p = *from++;
-    met_[i] = vector(from);
+    wall_velocity_[i] = vector(from);
     from += 3;
     if (role_[i] != SphRole::solid) continue;
     atom->p[i] = p;
@@ -332,7 +332,7 @@ void PairSphCoupled::wall_states() {
   if (extrapolated) loops_->wall_sums[kernel](arguments(rows_.near_fluid));
   for (int i = 0; i < own; ++i) {
     if (role_[i] != SphRole::solid) continue;
-    velocity_[i] = met_[i] = vector(atom->v[i]);
+    velocity_[i] = wall_velocity_[i] = vector(atom->v[i]);
     if (!extrapolated) {
       atom->p[i] = settings_.state.pressure(atom->rho[i]);
       continue;
@@ -343,13 +343,13 @@ void PairSphCoupled::wall_states() {
                                       body.acceleration_at(vector(atom->x[i]) - body.position));
     atom->p[i] = wall.pressure;
     atom->rho[i] = wall.density;
-    met_[i] = wall.velocity;
+    wall_velocity_[i] = wall.velocity;
     sum_[i] = {};
   }
   walls_to_ghosts_ = true;
   comm->forward_comm_pair(this);
   for (int i = 0; i < all; ++i)
-    if (role_[i] == SphRole::solid) records_[i] = force_record(vector(atom->x[i]), met_[i], atom->rho[i], atom->p[i]);
+    if (role_[i] == SphRole::solid) records_[i] = force_record(vector(atom->x[i]), wall_velocity_[i], atom->rho[i], atom->p[i]);
 }
 
 /// Accelerations over dt (s) into sum_.

@@ -78,7 +78,7 @@ class PairSphCoupled : public Pair {
   std::vector<dembark::sph::Record> records_;
   std::vector<double> rate_;
   std::vector<dembark::sph::Quad> sum_, shift_sum_;
-  std::vector<dembark::sph::Vector> velocity_, velocity_sum_, met_;
+  std::vector<dembark::sph::Vector> velocity_, velocity_sum_, wall_velocity_;
   bool walls_to_ghosts_ = false;  // what pack_comm() sends: pressures and velocities of solids, else densities
 };
 

@@ -77,7 +77,7 @@ void CapillaryLiquid::postLoad(CapillaryLiquid&) {
 }
 
 /// Bodies that are new get their liquid, those that were erased take theirs along. Of a scene that was loaded all are as they were.
-void CapillaryLiquid::meetBodies() {
+void CapillaryLiquid::registerNewBodies() {
 	const auto&       bodies = *Omega::instance().getScene()->bodies;
 	const std::size_t known = liquid.size(), count = std::max(bodies.size(), known);
 	const auto        bodyOf = [&](std::size_t id) { return id < bodies.size() ? bodies[id] : shared_ptr<Body>(); };
@@ -111,7 +111,7 @@ void CapillaryLiquid::meetBodies() {
 
 void CapillaryLiquid::setVolume(int body, Real amount) {
 	checkVolume("setVolume: volume", amount);
-	meetBodies();
+	registerNewBodies();
 	const auto& bodies = *Omega::instance().getScene()->bodies;
 	if (body < 0 || static_cast<std::size_t>(body) >= bodies.size() || !sphereOf(bodies[body]))
 		fail("CapillaryLiquid.setVolume: body " + std::to_string(body) +
@@ -120,7 +120,7 @@ void CapillaryLiquid::setVolume(int body, Real amount) {
 }
 
 void CapillaryLiquid::addWall(const std::vector<int>& bodies, Real pool, Real share_, Real part) {
-	meetBodies();
+	registerNewBodies();
 	const capillary::LiquidWall wall{std::to_string(ledger.walls.size()), pool, share_, part};
 	if (const char* wrong = wall.error()) fail(std::string("CapillaryLiquid.addWall: ") + wrong);
 	for (const int body : bodies) {
@@ -159,7 +159,7 @@ void CapillaryLiquid::reconcile() {
 void CapillaryLiquid::action() {
 	LiquidExchange& exchange = *lawOf(*scene)->exchange;
 	const auto      lock     = exchange.open(scene->iter);
-	meetBodies();
+	registerNewBodies();
 	const auto number = [this](auto& contacts) {
 		for (auto& each : contacts)
 			if (each.sides.wall) each.sides.other = wallNumber(each.sides.other);
@@ -174,7 +174,7 @@ void CapillaryLiquid::action() {
 }
 
 Real CapillaryLiquid::volume(int body) {
-	meetBodies();
+	registerNewBodies();
 	if (body < 0 || static_cast<std::size_t>(body) >= liquid.size())
 		fail("CapillaryLiquid.volume: there is no body " + std::to_string(body));
 	return liquid[body];
@@ -194,7 +194,7 @@ std::vector<Real> CapillaryLiquid::ofWalls(double capillary::LiquidWall::* of) c
 }
 
 capillary::LiquidLedger::Totals CapillaryLiquid::totals() {
-	meetBodies();
+	registerNewBodies();
 	return ledger.totals(grains());
 }
 

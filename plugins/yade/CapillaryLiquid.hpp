@@ -90,7 +90,7 @@ public:
 	// clang-format on
 
 private:
-	void                                       meetBodies();
+	void                                       registerNewBodies();
 	void                                       reconcile();
 	::dembark::capillary::GrainLiquid          grains() { return {liquid.data(), static_cast<int>(liquid.size())}; }
 	::dembark::capillary::LiquidLedger::Totals totals();
