@@ -42,7 +42,7 @@ copy() {  # copy FILE TARGET
   changed=$((changed + 1))
 }
 # The models and what they include; the rest of that folder is liggghts-dembark's own way into a finished library.
-for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,contact_data,model_properties}.h "$here"/plugins/liggghts/engine_access.{h,cpp}; do
+for file in "$here"/plugins/liggghts/*_model_*.h "$here"/plugins/liggghts/{bridge_reach,cohesion_on_core,contact_data,model_properties}.h "$here"/plugins/liggghts/engine_access.{h,cpp}; do
   copy "$file" "$src/$(basename "$file")"
 done
 # What LIGGGHTS and LAMMPS both have.

@@ -24,20 +24,29 @@ std::string types(int i, int j) { return "types " + std::to_string(i) + "-" + st
 
 }  // namespace
 
-const std::array<ContactCoefficients::Keyword, 12> ContactCoefficients::keywords = {{
-    {"youngs_modulus", &Given::youngs_modulus},
-    {"poissons_ratio", &Given::poissons_ratio},
-    {"restitution", &Given::restitution},
-    {"static_friction", &Given::static_friction},
-    {"kinetic_friction", &Given::kinetic_friction},
-    {"critical_slip_distance", &Given::critical_slip_distance},
-    {"interface_shear_strength", &Given::interface_shear_strength},
-    {"rolling_friction", &Given::rolling_friction},
-    {"rolling_damping_ratio", &Given::rolling_damping_ratio},
-    {"bridge_volume", &Given::bridge_volume},
-    {"contact_angle", &Given::contact_angle},
-    {"largest_radius", &Given::largest_radius},
-}};
+/// The numbers of one pair of types, for dembark::read_contact().
+class ContactCoefficients::Source : public dembark::ContactSource {
+  const ContactCoefficients& all_;
+  const int i_, j_;
+
+ public:
+  Source(const ContactCoefficients& all, int i, int j) : all_(all), i_(i), j_(j) {}
+
+  std::string name(const dembark::Parameter& p) const override { return p.name; }
+  double given(const dembark::Parameter& p, int body) const override {
+    const auto place = std::size_t(&p - dembark::contact_parameters);
+    if (p.scope == dembark::Scope::global) return all_.global_[place];
+    const int type = body == 1 ? i_ : j_;
+    return (p.scope == dembark::Scope::type ? all_.given_(type, type) : all_.given_(i_, j_)).value[place];
+  }
+  [[noreturn]] void missing(const dembark::Parameter& p, int body) const override {
+    if (p.scope == dembark::Scope::global) all_.fail(std::string(p.name) + " is missing; give it with pair_style: " + p.name + " VALUE");
+    const int first = p.scope == dembark::Scope::type && body == 2 ? j_ : i_, second = p.scope == dembark::Scope::type ? first : j_;
+    all_.fail(types(first, second) + " have no " + p.name + "; give it with pair_coeff " + std::to_string(first) + " " +
+              std::to_string(second) + " " + p.name + " VALUE");
+  }
+  [[noreturn]] void wrong(const std::string& line) const override { all_.fail(line + " (" + types(i_, j_) + ")"); }
+};
 
 void ContactCoefficients::fail(const std::string& what) const { error->all(FLERR, std::string("pair_style ") + style_name + ": " + what); }
 
@@ -53,10 +62,18 @@ void ContactCoefficients::choose(const std::string& keyword, const std::string& 
 }
 
 void ContactCoefficients::settings(int narg, char** arg) {
-  settings_ = {};
+  using dembark::ContactNumber;
+  options_ = {};
+  global_.fill(NAN);
   words_.clear();
   for (int k = 0; k < narg; ++k) words_ += std::string(arg[k]) + " ";
   const std::vector<std::string> off_on = {"off", "on"};
+  bool wet = false, dry = false;
+  const auto set = [this](ContactNumber which, double value) {
+    const dembark::Parameter& p = dembark::parameter(which);
+    if (const std::string line = dembark::wrong_value(p, p.name, value); !line.empty()) fail(line);
+    global_[static_cast<std::size_t>(which)] = value;
+  };
   for (int k = 0; k < narg;) {
     const std::string keyword = arg[k++];
     const auto word = [&]() -> const char* {
@@ -64,43 +81,47 @@ void ContactCoefficients::settings(int narg, char** arg) {
       return arg[k++];
     };
     if (keyword == "normal") {
-      choose(keyword, word(), dembark::normal_law_names(), settings_.normal_law);
-      if (settings_.normal_law == dembark::NormalLaw::hooke) {
-        settings_.characteristic_velocity = number("normal hooke", word());
-        if (!(settings_.characteristic_velocity > 0.0)) fail("normal hooke needs a characteristic velocity > 0 m/s");
-      }
-    } else if (keyword == "presliding") choose(keyword, word(), dembark::presliding_names(), settings_.presliding);
-    else if (keyword == "friction_limit") choose(keyword, word(), dembark::friction_limit_names(), settings_.friction_limit);
-    else if (keyword == "rolling_resistance") choose(keyword, word(), dembark::rolling_names(), settings_.rolling_model);
-    else if (keyword == "capillary_model") {
-      choose(keyword, word(), dembark::capillary::model_names(), settings_.capillary_model);
-      settings_.wet = true;
-    } else if (keyword == "surface_tension") settings_.surface_tension = number(keyword, word());
-    else if (keyword == "viscous_liquid") {
-      const double viscosity = number(keyword, word());
-      settings_.viscous = {viscosity, number(keyword, word())};
-      if (const char* wrong = settings_.viscous.error()) fail(keyword + ": " + wrong);
-    } else if (keyword == "carried_liquid") choose(keyword, word(), off_on, settings_.carried);
-    else if (keyword == "healing_time") settings_.healing_time = number(keyword, word());
-    else if (keyword == "tangential_damping") choose(keyword, word(), off_on, settings_.tangential_damping);
-    else if (keyword == "limit_force") choose(keyword, word(), off_on, settings_.limit_force);
+      choose(keyword, word(), dembark::normal_law_names(), options_.normal_law);
+      if (options_.normal_law == dembark::NormalLaw::hooke) set(ContactNumber::characteristic_velocity, number("normal hooke", word()));
+    } else if (keyword == "presliding") choose(keyword, word(), dembark::presliding_names(), options_.presliding);
+    else if (keyword == "friction_limit") choose(keyword, word(), dembark::friction_limit_names(), options_.friction_limit);
+    else if (keyword == "rolling_resistance") choose(keyword, word(), dembark::rolling_names(), options_.rolling_model);
+    else if (keyword == "cohesion") {
+      choose(keyword, word(), dembark::cohesion_names(), options_.cohesion);
+      dry = options_.cohesion != dembark::CohesionLaw::bridge;
+    } else if (keyword == "capillary_model") {
+      choose(keyword, word(), dembark::capillary::model_names(), options_.capillary_model);
+      wet = true;
+    } else if (keyword == "viscous_liquid") {
+      set(ContactNumber::liquid_viscosity, number(keyword, word()));
+      options_.viscous = global_[static_cast<std::size_t>(ContactNumber::liquid_viscosity)] > 0.0;
+      const double gap = number(keyword, word());
+      if (options_.viscous) set(ContactNumber::minimum_gap, gap);
+    } else if (keyword == "carried_liquid") choose(keyword, word(), off_on, options_.carried_liquid);
+    else if (keyword == "tangential_damping") choose(keyword, word(), off_on, options_.tangential_damping);
+    else if (keyword == "limit_force") choose(keyword, word(), off_on, options_.limit_force);
+    else if (keyword == "surface_tension") set(ContactNumber::surface_tension, number(keyword, word()));
+    else if (keyword == "healing_time") set(ContactNumber::healing_time, number(keyword, word()));
     else
       fail("'" + keyword +
-           "' is unknown; it can be normal, presliding, friction_limit, rolling_resistance, capillary_model, surface_tension, "
+           "' is unknown; it can be normal, presliding, friction_limit, rolling_resistance, cohesion, capillary_model, surface_tension, "
            "viscous_liquid, carried_liquid, healing_time, tangential_damping or limit_force");
   }
-  if (settings_.wet && !(settings_.surface_tension >= 0.0 && settings_.surface_tension < INFINITY))
-    fail("capillary_model needs surface_tension S with S (N/m) >= 0 and finite");
-  if (!settings_.wet && (!std::isnan(settings_.surface_tension) || settings_.viscous.on()))
+  if (wet && dry) fail("capillary_model is for the cohesion bridge");
+  if (wet) options_.cohesion = dembark::CohesionLaw::bridge;
+  const bool bridges = options_.cohesion == dembark::CohesionLaw::bridge;
+  if (!bridges && (!std::isnan(global_[static_cast<std::size_t>(ContactNumber::surface_tension)]) || options_.viscous))
     fail("surface_tension and viscous_liquid need a capillary_model");
-  if (!settings_.wet && settings_.carried) fail("carried_liquid needs a capillary_model");
+  if (!bridges && options_.carried_liquid) fail("carried_liquid needs a capillary_model");
+  if (bridges && std::isnan(global_[static_cast<std::size_t>(ContactNumber::surface_tension)]))
+    fail("capillary_model needs surface_tension S with S (N/m) >= 0 and finite");
 }
 
 std::string ContactCoefficients::given() const {
   std::string text = words_;
   for (int i = 1; i <= given_.types(); ++i)
     for (int j = i; j <= given_.types(); ++j)
-      for (const Keyword& each : keywords) text += fmt::format("{:.17g} ", given_(i, j).*each.value);
+      for (const double value : given_(i, j).value) text += fmt::format("{:.17g} ", value);
   return text;
 }
 
@@ -117,44 +138,39 @@ std::vector<std::array<int, 2>> ContactCoefficients::coeff(int narg, char** arg)
   if (pairs.empty()) fail(std::string("pair_coeff ") + arg[0] + " " + arg[1] + " names no pair of types; the smaller one comes first");
   for (int k = 2; k < narg; k += 2) {
     const std::string name = arg[k];
-    const auto known = std::find_if(keywords.begin(), keywords.end(), [&](const Keyword& each) { return name == each.name; });
-    if (known == keywords.end()) {
+    const dembark::Parameter* const known = dembark::parameter(name);
+    const bool radius = name == "largest_radius";
+    if (!radius && (!known || known->scope == dembark::Scope::global)) {
       std::vector<std::string> names;
-      for (const Keyword& each : keywords) names.emplace_back(each.name);
+      for (const dembark::Parameter& each : dembark::contact_parameters)
+        if (each.scope != dembark::Scope::global) names.emplace_back(each.name);
+      names.emplace_back("largest_radius");
       fail("pair_coeff knows no '" + name + "'; it knows " + list(names));
     }
     if (k + 1 == narg) fail("pair_coeff: " + name + " needs a value");
     const double value = number("pair_coeff: " + name, arg[k + 1]);
-    if (known->value == &Given::largest_radius && !(value >= 0.0 && value < INFINITY)) fail("largest_radius must be >= 0 and finite");
-    if (one_pair && of_one_type(known->value))
+    if (radius && !(value >= 0.0 && value < INFINITY)) fail("largest_radius must be >= 0 and finite");
+    if (one_pair && (radius || known->scope == dembark::Scope::type))
       fail(name + " belongs to one type; give it with pair_coeff " + arg[0] + " " + arg[0] + " and pair_coeff " + arg[1] + " " + arg[1]);
-    for (const auto& [i, j] : pairs) given_(i, j).*known->value = given_(j, i).*known->value = value;
+    for (const auto& [i, j] : pairs)
+      for (Given* const given : {&given_(i, j), &given_(j, i)})
+        (radius ? given->largest_radius : given->value[std::size_t(known - dembark::contact_parameters)]) = value;
   }
   return pairs;
 }
 
-double ContactCoefficients::needed(int i, int j, double Given::* value) const {
-  const double found = given_(i, j).*value;
-  if (std::isnan(found)) {
-    const auto keyword = std::find_if(keywords.begin(), keywords.end(), [&](const Keyword& each) { return each.value == value; });
-    fail(types(i, j) + " have no " + keyword->name + "; give it with pair_coeff " + std::to_string(i) + " " + std::to_string(j) + " " +
-         keyword->name + " VALUE");
-  }
-  return found;
-}
-
 ContactParameters ContactCoefficients::common() const {
   ContactParameters p;
-  p.normal_law = settings_.normal_law;
-  p.characteristic_velocity = settings_.characteristic_velocity;
-  p.tangential_damping = settings_.tangential_damping;
-  p.limit_force = settings_.limit_force;
-  p.friction.healing_time = settings_.healing_time;
-  p.friction.presliding = settings_.presliding;
-  p.friction.friction_limit = settings_.friction_limit;
-  p.rolling.model = settings_.rolling_model;
-  p.liquid.surface_tension = settings_.surface_tension;
-  p.liquid.viscous = settings_.viscous;
+  p.normal_law = options_.normal_law;
+  p.tangential_damping = options_.tangential_damping;
+  p.limit_force = options_.limit_force;
+  p.friction.presliding = options_.presliding;
+  p.friction.friction_limit = options_.friction_limit;
+  p.rolling.model = options_.rolling_model;
+  p.cohesion.law = options_.cohesion;
+  const auto global = [this](dembark::ContactNumber which) { return global_[static_cast<std::size_t>(which)]; };
+  if (options_.viscous)
+    p.cohesion.liquid.viscous = {global(dembark::ContactNumber::liquid_viscosity), global(dembark::ContactNumber::minimum_gap)};
   return p;
 }
 
@@ -169,41 +185,7 @@ void ContactCoefficients::begin() {
 }
 
 void ContactCoefficients::complete(int i, int j) {
-  const Given& given = given_(i, j);
-  const std::string pair = " (" + types(i, j) + ")";
-  const double youngs[2] = {needed(i, i, &Given::youngs_modulus), needed(j, j, &Given::youngs_modulus)};
-  const double poisson[2] = {needed(i, i, &Given::poissons_ratio), needed(j, j, &Given::poissons_ratio)};
-  for (int k = 0; k < 2; ++k) {
-    if (!(youngs[k] > 0.0 && youngs[k] < INFINITY)) fail("youngs_modulus (Pa) must be > 0 and finite" + pair);
-    if (!(poisson[k] > -1.0 && poisson[k] <= 0.5)) fail("poissons_ratio must be > -1 and <= 0.5" + pair);
-  }
-  const double restitution = needed(i, j, &Given::restitution);
-  if (!(restitution > 0.0 && restitution <= 1.0)) fail("restitution must be > 0 and <= 1" + pair);
-
-  ContactParameters p = common();
-  p.elasticity = {dembark::effective_youngs_modulus(youngs[0], poisson[0], youngs[1], poisson[1]),
-                  dembark::effective_shear_modulus(youngs[0], poisson[0], youngs[1], poisson[1]), restitution};
-  p.friction = {needed(i, j, &Given::static_friction),
-                needed(i, j, &Given::kinetic_friction),
-                needed(i, j, &Given::critical_slip_distance),
-                given.interface_shear_strength,
-                settings_.healing_time,
-                settings_.presliding,
-                settings_.friction_limit};
-  if (const char* wrong = p.friction.error()) fail(wrong + pair);
-  if (settings_.rolling_model != dembark::RollingModel::off)
-    p.rolling = {settings_.rolling_model, needed(i, j, &Given::rolling_friction), given.rolling_damping_ratio};
-  if (const char* wrong = p.rolling.error()) fail(wrong + pair);
-  if (settings_.wet) {
-    if (settings_.carried && given.bridge_volume > 0.0)
-      fail("bridge_volume is given, but with carried_liquid on a bridge takes its volume from the grains; leave one of them out" + pair);
-    const double volume = settings_.carried ? 0.0 : needed(i, j, &Given::bridge_volume), angle = needed(i, j, &Given::contact_angle);
-    if (!(volume >= 0.0 && volume < INFINITY)) fail("bridge_volume (m^3) must be >= 0 and finite" + pair);
-    if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi)) fail("contact_angle is in radians and must lie in 0...pi/2 (1.5708)" + pair);
-    p.liquid = {&dembark::capillary::shared_bridge_force(settings_.capillary_model, angle), settings_.surface_tension, volume,
-                settings_.viscous};
-  }
-  parameters_(i, j) = parameters_(j, i) = p;
+  parameters_(i, j) = parameters_(j, i) = dembark::read_contact(options_, Source(*this, i, j));
   complete_(i, j) = complete_(j, i) = 1;
 }
 

@@ -11,36 +11,21 @@
 
 #include "dembark/contact_history.hpp"
 #include "dembark/pair_table.hpp"
+#include "dembark/parameters/contact_parameters.hpp"
 
 namespace dembark_lammps {
 
 class ContactCoefficients : protected LAMMPS_NS::Pointers {
-  /// Given by pair_coeff; NAN: not yet.
+  /// Given by pair_coeff, in the order of dembark::contact_parameters; NAN: not yet.
   struct Given {
-    double youngs_modulus = NAN, poissons_ratio = NAN;  // of a type: of pairs of equal types
-    double restitution = NAN, static_friction = NAN, kinetic_friction = NAN, critical_slip_distance = NAN;
-    double interface_shear_strength = dembark::unlimited_strength;
-    double rolling_friction = NAN, rolling_damping_ratio = 0.0;
-    double bridge_volume = NAN, contact_angle = NAN;
+    std::array<double, dembark::contact_parameter_count> value;
     double largest_radius = 0.0;  // of a type: what it may grow to in a run
+    Given() { value.fill(NAN); }
   };
-  struct Keyword {
-    const char* name;
-    double Given::* value;
-  };
-  static const std::array<Keyword, 12> keywords;
 
   /// Given by pair_style.
-  struct Settings {
-    dembark::NormalLaw normal_law = dembark::NormalLaw::hertz;
-    double characteristic_velocity = NAN, healing_time = 0.0, surface_tension = NAN;
-    dembark::Presliding presliding = dembark::Presliding::linear;
-    dembark::FrictionLimit friction_limit = dembark::FrictionLimit::total;
-    dembark::RollingModel rolling_model = dembark::RollingModel::off;
-    bool wet = false, carried = false, tangential_damping = true, limit_force = false;
-    dembark::capillary::Model capillary_model = dembark::capillary::Model::exact;
-    dembark::capillary::ViscousLiquid viscous{};
-  } settings_;
+  dembark::ContactOptions options_;
+  std::array<double, dembark::contact_parameter_count> global_;
   std::string words_;  // of the settings
   dembark::PairTable<Given> given_;
   dembark::PairTable<dembark::ContactParameters> parameters_;
@@ -49,12 +34,9 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
   double number(const std::string& keyword, const char* text) const;
   template <class Option>
   void choose(const std::string& keyword, const std::string& word, const std::vector<std::string>& names, Option& option) const;
-  static bool of_one_type(double Given::* value) {
-    return value == &Given::youngs_modulus || value == &Given::poissons_ratio || value == &Given::largest_radius;
-  }
-  double needed(int i, int j, double Given::* value) const;
   /// What pair_style says of all pairs.
   dembark::ContactParameters common() const;
+  class Source;
 
  public:
   static constexpr const char* style_name = "dembark/granular";
@@ -79,10 +61,11 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
   double largest_radius(int type) const { return given_(type, type).largest_radius; }
   /// All words and numbers that were given, as a text.
   std::string given() const;
-  bool wet() const { return settings_.wet; }
+  /// Whether contacts are held over gaps.
+  bool holds() const { return dembark::Cohesion{options_.cohesion}.holds(); }
   dembark::HistoryLayout layout() const {
-    return {settings_.wet, settings_.presliding == dembark::Presliding::partial_slip,
-            settings_.rolling_model == dembark::RollingModel::elastic_plastic, settings_.carried};
+    return {holds(), options_.presliding == dembark::Presliding::partial_slip,
+            options_.rolling_model == dembark::RollingModel::elastic_plastic, options_.carried_liquid};
   }
 };
 

@@ -70,8 +70,8 @@ void FixCapillaryLiquid::each_pair_bridge(const VisitPair& visit) const {
     const int i = list.ilist[ii];
     const double* row = pair_->history().firstvalue[i];
     for (int k = 0; k < list.numneigh[i]; ++k, row += layout.size())
-      if (pair_->history().firstflag[i][k] && row[layout.bridge_at()] > 0.0)
-        visit(i, list.firstneigh[i][k] & NEIGHMASK, row[layout.bridge_at()], row[layout.imbalance_at()]);
+      if (pair_->history().firstflag[i][k] && row[layout.cohesion_at()] > 0.0)
+        visit(i, list.firstneigh[i][k] & NEIGHMASK, row[layout.cohesion_at()], row[layout.imbalance_at()]);
   }
 }
 

@@ -76,7 +76,7 @@ void FixWallDembark::init() {
   find_pair();
   liquid_ = layout_.imbalance ? dembark_lammps::find_liquid(modify) : nullptr;
   tally_ = dembark_lammps::find_energy_tally(modify);
-  checked([&] { surface_->prepare(pair_->largest_radius() + (layout_.bridge ? neighbor->skin : 0.0), motion_.get()); });
+  checked([&] { surface_->prepare(pair_->largest_radius() + (layout_.cohesion ? neighbor->skin : 0.0), motion_.get()); });
   if (pair_->coefficients().layout().code() != layout_.code()) fail("pair_style has other options than before; define the fix again");
   check_types();
   if (!motion_) return;
@@ -152,8 +152,8 @@ void FixWallDembark::post_force(int) {
 void FixWallDembark::act_on(int i, bool advance) {
   std::vector<double>& slots = row(i);
   double reach = 0.0;  // of its longest bridge
-  for (std::size_t k = 0; layout_.bridge && k < slots.size(); k += std::size_t(slot_size()))
-    reach = std::max(reach, slots[k + 1 + std::size_t(layout_.bridge_at()) + 1]);
+  for (std::size_t k = 0; layout_.cohesion && k < slots.size(); k += std::size_t(slot_size()))
+    reach = std::max(reach, slots[k + 1 + std::size_t(layout_.cohesion_at()) + 1]);
   const Vec3 x = vector(atom->x[i]), centre = frame_.inside(x);
   const std::vector<dembark_lammps::WallContact>& contacts = surface_->contacts(centre, atom->radius[i], reach);
   if (contacts.empty() && slots.empty()) return;
@@ -179,12 +179,13 @@ void FixWallDembark::act_on(int i, bool advance) {
     dembark::ContactState state;
     const double* const history = history_of(contact, centre, atom->radius[i]);
     if (history) layout_.load(history, state);
-    const double volume = state.bridge_volume;
+    const double volume = state.cohesion.bridge_volume;
+    const bool was_held = state.cohesion.held();
     const dembark::ContactForce out = contact_step(p, b, update->dt, state, advance);
     if (dembark::has_no_direction(out.normal)) error->one(FLERR, "fix wall/dembark: the centre of grain {} lies on the wall", atom->tag[i]);
     const bool touching = out.overlap > 0.0;
-    if (advance && !(volume > 0.0) && (state.bridge_volume > 0.0 || (liquid_ && touching)))
-      dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
+    if (advance && !was_held && (state.cohesion.held() || (liquid_ && touching)))
+      dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
     if (!out.interacting && !(volume > 0.0)) continue;
     if (tally_ && out.interacting) tally_->add(p, b, out, state, advance, i, x, acceleration_);
     if (advance) {
@@ -195,8 +196,8 @@ void FixWallDembark::act_on(int i, bool advance) {
       if (liquid_) {
         double* const imbalance = next + 1 + layout_.imbalance_at();
         *imbalance = history ? history[layout_.imbalance_at()] : 0.0;
-        liquid_->report({i, liquid_->wall_number(this), true}, atom->radius[i], INFINITY, p.liquid, touching, volume,
-                        next + 1 + layout_.bridge_at(), imbalance);
+        liquid_->report({i, liquid_->wall_number(this), true}, atom->radius[i], INFINITY, p.cohesion.liquid, touching, volume,
+                        next + 1 + layout_.cohesion_at(), imbalance);
       }
     }
     add(atom->f[i], out.force);
@@ -205,7 +206,7 @@ void FixWallDembark::act_on(int i, bool advance) {
     add(totals_.data(), out.force);
     add(totals_.data() + 3, cross(x - origin(), out.force) + out.torque_1);
     totals_[6] += touching;
-    totals_[7] += state.bridge_volume > 0.0;
+    totals_[7] += state.cohesion.held();
   }
   make_room(i);
 }

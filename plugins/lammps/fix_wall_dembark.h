@@ -53,7 +53,7 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
   void each_bridge(int i, Visit visit) {
     double* const end = row(i).data() + row(i).size();
     for (double* slot = row(i).data(); slot < end; slot += slot_size())
-      if (slot[1 + layout_.bridge_at()] > 0.0) visit(slot[1 + layout_.bridge_at()], slot[1 + layout_.imbalance_at()]);
+      if (slot[1 + layout_.cohesion_at()] > 0.0) visit(slot[1 + layout_.cohesion_at()], slot[1 + layout_.imbalance_at()]);
   }
 
  private:

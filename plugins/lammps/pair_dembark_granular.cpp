@@ -95,7 +95,7 @@ void PairDembarkGranular::init_style() {
     history_->pair = this;
   }
   // A bridge keeps its history over the gap.
-  beyond_contact = coefficients_.wet();
+  beyond_contact = coefficients_.holds();
   const auto freeze = modify->get_fix_by_style("^freeze");
   freeze_bit_ = freeze.empty() ? 0 : freeze.front()->groupbit;
   liquid_ = layout_.imbalance ? dembark_lammps::find_liquid(modify) : nullptr;
@@ -106,10 +106,10 @@ void PairDembarkGranular::init_style() {
   for (Fix* const fix : modify->get_fix_list())
     if (fix->rigid_flag) rigid_.push_back(fix);
   const dembark::ContactParameters& any = coefficients_(1, 1);
-  packed_ = any.normal_law == dembark::NormalLaw::hertz && !any.liquid.viscous.on() && asked() && atom->molecular == Atom::ATOMIC;
+  packed_ = any.normal_law == dembark::NormalLaw::hertz && !any.cohesion.liquid.viscous.on() && asked() && atom->molecular == Atom::ATOMIC;
   const auto place = [](bool there, int at) { return there ? at : -1; };
   begin(*atom,
-        {0, place(layout_.bridge, layout_.bridge_at()), place(layout_.rings, layout_.rings_at()),
+        {0, place(layout_.cohesion, layout_.cohesion_at()), place(layout_.rings, layout_.rings_at()),
          place(layout_.rolling, layout_.rolling_at()), layout_.imbalance_at()},
         freeze_bit_, liquid_, energies_);
   find_radii();
@@ -183,7 +183,7 @@ double PairDembarkGranular::init_one(int i, int j) {
   if (!setflag[i][j]) coefficients_.fail("pair_coeff " + std::to_string(i) + " " + std::to_string(j) + " is missing");
   coefficients_.complete(i, j);
   // No bridge is longer than the skin, and what lists pairs looks no further than this.
-  const double reach = coefficients_.wet() ? neighbor->skin : 0.0;
+  const double reach = coefficients_.holds() ? neighbor->skin : 0.0;
   return largest_radius_[std::size_t(i)] + largest_radius_[std::size_t(j)] + reach;
 }
 
@@ -293,22 +293,22 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
     const ContactBodies b = bodies(i, j);
     ContactState state;
     if (touched) layout_.load(row, state);
-    const bool was_bridged = state.bridge_volume > 0.0;
+    const bool was_held = state.cohesion.held();
+    const double before = state.cohesion.bridge_volume;
     const ContactForce out = contact_step(p, b, update->dt, state, advance);
     if (dembark::has_no_direction(out.normal)) refuse_coincidence(i, j);
     if (advance) {
-      if (state.bridge_volume > 0.0 && !was_bridged) {
-        dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
-        check_reach(i, j, state.rupture_distance);
+      if (state.cohesion.held() && !was_held) {
+        dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
+        check_reach(i, j, state.cohesion.rupture_distance);
       }
       touches = out.interacting;
-      const double before = was_bridged ? row[layout_.bridge_at()] : 0.0;
       layout_.store(row, state);
       if (liquid_) {
         if (!touched) row[layout_.imbalance_at()] = 0.0;
-        if (out.overlap > 0.0 && !was_bridged) dembark_lammps::check_time_step(error, p.liquid, b, update->dt);
-        liquid_->report({i, j, false}, atom->radius[i], atom->radius[j], p.liquid, out.overlap > 0.0, before, row + layout_.bridge_at(),
-                        row + layout_.imbalance_at());
+        if (out.overlap > 0.0 && !was_held) dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
+        liquid_->report({i, j, false}, atom->radius[i], atom->radius[j], p.cohesion.liquid, out.overlap > 0.0, before,
+                        row + layout_.cohesion_at(), row + layout_.imbalance_at());
       }
     }
     if (!out.interacting) return;
@@ -347,8 +347,8 @@ double PairDembarkGranular::single(int i, int j, int itype, int jtype, double rs
   add(svector + 3, tangential);
   add(svector + 6, out.rolling);
   svector[9] = out.overlap;
-  svector[10] = out.capillary_force;
-  svector[11] = state.bridge_volume;
+  svector[10] = out.cohesive_force;
+  svector[11] = state.cohesion.bridge_volume;
   add(svector + 12, vector(atom->x[i]));
   add(svector + 15, vector(atom->x[j]));
   fforce = dot(out.force, b.separation) / rsq;

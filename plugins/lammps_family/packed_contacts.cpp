@@ -51,7 +51,7 @@ dembark::PairStep PackedContacts::describe(const LAMMPS_NS::NeighList& list, int
   step.more = at.rings >= 0 ? at.rings : at.rolling;
   step.more_numbers = (at.rings >= 0 ? dembark::ring_numbers : 0) + (at.rolling >= 0 ? 3 : 0);
   step.dt = dt;
-  step.wet = at.bridge >= 0;
+  step.wet = any.cohesion.on();
   step.limit_force = any.limit_force;
   step.tangential_damping = any.tangential_damping;
   step.elastic_limit = any.friction.friction_limit == dembark::FrictionLimit::elastic;
@@ -121,24 +121,25 @@ double PackedContacts::sliding_limit(const PairBlock& block, int k, const dembar
   return dembark::sliding_limit(law(block, k).friction, motion, rings, rings + dembark::SlipRings::count, normal_force, contact_area, slip);
 }
 
-void PackedContacts::bridges(const PairBlock& block, int first, int count, const double* gap, double* capillary_force) {
+void PackedContacts::bridges(const PairBlock& block, int first, int count, const double* gap, double* cohesive_force) {
   for (int n = 0; n < count; ++n) {
     const int k = first + n, i = block.grain[k], j = block.partner[k];
     const bool touching = block.pick[k] & 1;
-    double* const bridge = block.history[k] + tally_.at.bridge;
-    const double before = bridge[0];
-    double volume = before, rupture_distance = bridge[1];
-    const dembark::Liquid& liquid = law(block, k).liquid;
-    capillary_force[n] = bridge_step(liquid, atom_->radius[i], atom_->radius[j], gap[n], touching, volume, rupture_distance);
-    tally_.note_capillary_force(k, capillary_force[n]);
+    // Laws that hold no contact have no place in a history.
+    double* const row = tally_.at.cohesion >= 0 ? block.history[k] + tally_.at.cohesion : nullptr;
+    const dembark::CohesionState before = row ? dembark::load_cohesion(row) : dembark::CohesionState{};
+    dembark::CohesionState now = before;
+    const ContactParameters& p = law(block, k);
+    cohesive_force[n] = cohesion_step(
+        p.cohesion, {atom_->radius[i], atom_->radius[j], gap[n], touching, p.elasticity.effective_youngs_modulus}, now);
+    tally_.note_cohesive_force(k, cohesive_force[n]);
     // One that cannot break in this pass, the set-up of a run, is looked at again in the next.
-    if (!touching && (volume > 0.0 || (before > 0.0 && !keeps_bridges_))) *block.flags[k] |= bridge_flag_;
-    if (volume > 0.0 && !(before > 0.0)) check_reach(i, j, rupture_distance);
-    if (!keeps_bridges_) continue;
-    bridge[0] = volume;
-    bridge[1] = rupture_distance;
+    if (!touching && (now.held() || (before.held() && !keeps_bridges_))) *block.flags[k] |= bridge_flag_;
+    if (now.held() && !before.held()) check_reach(i, j, now.rupture_distance);
+    if (!keeps_bridges_ || !row) continue;
+    dembark::store_cohesion(row, now);
     if (liquid_)
-      liquid_->report({i, j, false}, atom_->radius[i], atom_->radius[j], liquid, touching, before, bridge,
+      liquid_->report({i, j, false}, atom_->radius[i], atom_->radius[j], p.cohesion.liquid, touching, before.bridge_volume, row,
                       block.history[k] + tally_.at.imbalance);
   }
 }

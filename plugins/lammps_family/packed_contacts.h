@@ -52,7 +52,7 @@ class PackedContacts : dembark::ContactCallbacks, dembark::HistoryCallbacks {
   double limit(const PairBlock& block, int k, double normal_force, double contact_area, double slip) override;
   double sliding_limit(const PairBlock& block, int k, const dembark::RingMotion<double>& motion, const double* rings, double normal_force,
                        double contact_area, double& slip) override;
-  void bridges(const PairBlock& block, int first, int count, const double* gap, double* capillary_force) override;
+  void bridges(const PairBlock& block, int first, int count, const double* gap, double* cohesive_force) override;
   const dembark::ContactParameters& law(const PairBlock& block, int k) const {
     return law(atom_->type[block.grain[k]], atom_->type[block.partner[k]]);
   }

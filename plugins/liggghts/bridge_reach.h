@@ -43,23 +43,21 @@ inline std::vector<RadiusRange> radius_ranges(const LAMMPS_NS::Atom& atom, const
   return all;
 }
 
-/// The contact distance factor f with which pairs (`wall` null) or the grains at a wall are kept up to the rupture of their bridges, of
-/// `volume(liquid, radius, other radius)` (m^3): pairs are kept to (f - 1) (r_i + r_j), grains at walls to (f - 1) r_i. The smallest or the
+/// The contact distance factor f with which pairs (`wall` null) or the grains at a wall are kept as far as they are held:
+/// `reach(i, j, radius, other radius)` (m). Pairs are kept to (f - 1) (r_i + r_j), grains at walls to (f - 1) r_i. The smallest or the
 /// largest grains need the largest factor.
-template <class Volume>
-double bridge_distance_factor(const PairTable<dembark::Liquid>& liquids, const std::vector<RadiusRange>& ranges,
-                              const LAMMPS_NS::FixWallGran* wall, Volume volume) {
+template <class Reach>
+double cohesion_distance_factor(int types, const std::vector<RadiusRange>& ranges, const LAMMPS_NS::FixWallGran* wall, Reach reach) {
   double factor = 1.0;
-  const auto include = [&](const dembark::Liquid& liquid, double radius, double other) {
-    const double rupture = liquid.force->rupture_distance(radius, other, volume(liquid, radius, other));
-    factor = std::max(factor, 1.0 + 1.001 * rupture / (wall ? radius : radius + other));
+  const auto include = [&](int i, int j, double radius, double other) {
+    factor = std::max(factor, 1.0 + 1.001 * reach(i, j, radius, other) / (wall ? radius : radius + other));
   };
-  for (int i = 1; i <= liquids.types(); ++i)
-    for (int j = 1; j <= liquids.types(); ++j) {
+  for (int i = 1; i <= types; ++i)
+    for (int j = 1; j <= types; ++j) {
       const RadiusRange &own = ranges[std::size_t(i)], &other = ranges[std::size_t(j)];
       if (own.empty() || (wall ? j != wall->atom_type_wall() : other.empty())) continue;
       for (const double radius : {own.least, own.largest})
-        for (const double partner : {other.least, other.largest}) include(liquids(i, j), radius, wall ? INFINITY : partner);
+        for (const double partner : {other.least, other.largest}) include(i, j, radius, wall ? INFINITY : partner);
     }
   return factor;
 }
@@ -73,13 +71,12 @@ inline void check_reach(LAMMPS_NS::Neighbor* neighbor, LAMMPS_NS::Error* error, 
   char line[256];
   if (beyond_skin)
     snprintf(line, sizeof line,
-             "cohesion capillary: a bridge to a primitive wall reaches %g m but the neighbour skin is %g m; use neighbor %.3g bin",
+             "cohesion: a contact with a primitive wall reaches %g m but the neighbour skin is %g m; use neighbor %.3g bin",
              rupture_distance, neighbor->skin, 1.01 * rupture_distance);
   else
-    snprintf(
-        line, sizeof line,
-        "cohesion capillary: a bridge reaches %g m but neighbours are kept to %g m only; use neigh_modify contact_distance_factor %.3g",
-        rupture_distance, reach, (1.0 + rupture_distance / size) * 1.01);
+    snprintf(line, sizeof line,
+             "cohesion: a contact reaches %g m but neighbours are kept to %g m only; use neigh_modify contact_distance_factor %.3g",
+             rupture_distance, reach, (1.0 + rupture_distance / size) * 1.01);
   error->one(FLERR, line);
 }
 

@@ -38,16 +38,14 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
                        PairParameters {
   typedef LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactModels::ContactModel<Style>> Stock;
   static constexpr bool wet = Style::COHESION == LIGGGHTS::ContactModels::COHESION_CAPILLARY;
+  static constexpr bool cohesive = wet || Style::COHESION == LIGGGHTS::ContactModels::COHESION_ADHESION;
 
   LAMMPS_NS::LAMMPS* lmp_;
   LAMMPS_NS::PairGran* pair_;
   PairTable<dembark::ContactParameters> laws_;
   LAMMPS_NS::FixCapillaryLiquid* liquid_ = nullptr;  // of carried liquid
-  bool plain_settings_ = true, carried_ = false, limit_force_ = false, tangential_damping_ = true;
-  dembark::Presliding presliding_ = dembark::Presliding::linear;
-  dembark::FrictionLimit friction_limit_ = dembark::FrictionLimit::total;
-  dembark::RollingModel rolling_model_ = dembark::RollingModel::off;
-  dembark::capillary::Model model_ = dembark::capillary::Model::exact;
+  bool plain_settings_ = true;
+  dembark::ContactOptions options_;
   const bool in_packs_ = asked();
 
   bool plain_step(LAMMPS_NS::PairGran* pair, int addflag) const {
@@ -72,12 +70,9 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
         const double* const history = histories.firstdouble[i] + pair.dnum() * k;
         dembark::ContactState state;
         const dembark_family::HistoryPlaces& at = tally_.at;
-        if (wet) {
-          state.bridge_volume = history[at.bridge];
-          state.rupture_distance = history[at.bridge + 1];
-        }
+        if (at.cohesion >= 0) state.cohesion = dembark::load_cohesion(history + at.cohesion);
         const double reach = atom.radius[i] + atom.radius[j];
-        if (dot(apart, apart) >= reach * reach && !(state.bridge_volume > 0.0)) continue;
+        if (dot(apart, apart) >= reach * reach && !state.cohesion.held()) continue;
         state.friction = load_friction(history + at.friction);
         if (at.rings >= 0) state.rings = load_rings(history + at.rings);
         if (at.rolling >= 0) state.rolling_angle = vector(history + at.rolling);
@@ -121,30 +116,35 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
 
   void settings(int count, char** words, LIGGGHTS::IContactHistorySetup* history) override {
     Stock::settings(count, words, history);
+    int adhesion = 0;
     for (int k = 0; k + 1 < count; k += 2) {
       const std::string word = words[k], value = words[k + 1];
-      if (word == "limitForce") limit_force_ = value == "on";
-      else if (word == "tangential_damping") tangential_damping_ = value == "on";
-      else if (word == "presliding") dembark::option_from_name(dembark::presliding_names(), value, presliding_);
-      else if (word == "friction_limit") dembark::option_from_name(dembark::friction_limit_names(), value, friction_limit_);
-      else if (word == "rolling_resistance") dembark::option_from_name(dembark::rolling_names(), value, rolling_model_);
-      else if (word == "carried_liquid") carried_ = value == "on";
-      else if (word == "capillary_model") dembark::capillary::model_from_name(words[k + 1], model_);
-      else if (value != "off") plain_settings_ = false;
+      if (word == "limitForce") options_.limit_force = value == "on";
+      else if (word == "tangential_damping") options_.tangential_damping = value == "on";
+      else if (word == "presliding") dembark::option_from_name(dembark::presliding_names(), value, options_.presliding);
+      else if (word == "friction_limit") dembark::option_from_name(dembark::friction_limit_names(), value, options_.friction_limit);
+      else if (word == "rolling_resistance") dembark::option_from_name(dembark::rolling_names(), value, options_.rolling_model);
+      else if (word == "carried_liquid") options_.carried_liquid = value == "on";
+      else if (word == "capillary_model") dembark::capillary::model_from_name(words[k + 1], options_.capillary_model);
+      else if (word == "adhesion_law") {
+        int law = 0;
+        if (dembark::option_from_name(LIGGGHTS::ContactModels::adhesion_names(), value, law)) adhesion = law;
+      } else if (value != "off") plain_settings_ = false;
     }
+    if (cohesive) options_.cohesion = wet ? dembark::CohesionLaw::bridge : LIGGGHTS::ContactModels::adhesion_law(adhesion);
   }
 
   void init_granular() override {
     namespace models = LIGGGHTS::ContactModels;
     Stock::init_granular();
     typedef models::TangentialModel<models::TANGENTIAL_FINNIE_RABINOWICZ> Friction;
-    typedef models::CohesionModel<models::COHESION_CAPILLARY> Bridges;
+    typedef models::CohesionOnCore<wet> Attraction;
     dembark_family::HistoryPlaces at;
     at.friction = Stock::get_history_offset(Friction::history_name);
-    if (presliding_ == dembark::Presliding::partial_slip) at.rings = Stock::get_history_offset(Friction::rings_name);
-    if (rolling_model_ == dembark::RollingModel::elastic_plastic) at.rolling = Stock::get_history_offset(Friction::angle_name);
-    if (wet && plain_settings_) at.bridge = Stock::get_history_offset(Bridges::history_name);
-    if (at.bridge >= 0 && carried_) at.imbalance = Stock::get_history_offset(Bridges::imbalance_name);
+    if (options_.presliding == dembark::Presliding::partial_slip) at.rings = Stock::get_history_offset(Friction::rings_name);
+    if (options_.rolling_model == dembark::RollingModel::elastic_plastic) at.rolling = Stock::get_history_offset(Friction::angle_name);
+    if (cohesive && plain_settings_) at.cohesion = Stock::get_history_offset(Attraction::history_name);
+    if (at.cohesion >= 0 && options_.carried_liquid) at.imbalance = Stock::get_history_offset(Attraction::imbalance_name);
     liquid_ =
         at.imbalance >= 0 ? static_cast<LAMMPS_NS::FixCapillaryLiquid*>(lmp_->modify->find_fix_style("capillary/liquid", 0)) : nullptr;
     begin(*lmp_->atom, at, pair_->freeze_group_bit(), liquid_, find_energy_tally(lmp_->modify));
@@ -159,23 +159,24 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     registry.connect("Geff", shear_modulus, "model hertz");
     registry.connect("betaeff", damping_factor, "model hertz");
     const PropertyReader read(registry, lmp_->modify, lmp_->error, "pair_style gran");
-    const auto friction = read_friction(read, presliding_, friction_limit_);
+    const auto friction = read_friction(read, options_);
     PairTable<dembark::RollingResistance> rolling;
-    PairTable<dembark::Liquid> liquids;
-    if (rolling_model_ != dembark::RollingModel::off) rolling = read_rolling(read, rolling_model_);
-    if (wet && plain_settings_) liquids = read_liquids(read, model_, false, carried_);
-    laws_ = for_all_pairs(read, [&](int i, int j, const std::string&) {
-      dembark::ContactParameters p;
-      p.elasticity.effective_youngs_modulus = youngs_modulus[i][j];
-      p.elasticity.effective_shear_modulus = shear_modulus[i][j];
-      p.elasticity.damping = damping_factor[i][j];
-      p.tangential_damping = tangential_damping_;
-      p.limit_force = limit_force_;
-      p.friction = friction(i, j);
-      if (rolling_model_ != dembark::RollingModel::off) p.rolling = rolling(i, j);
-      if (wet && plain_settings_) p.liquid = liquids(i, j);
-      return p;
-    });
+    PairTable<dembark::Cohesion> cohesion;
+    if (options_.rolling_model != dembark::RollingModel::off) rolling = read_rolling(read, options_);
+    if (cohesive && plain_settings_) cohesion = read_cohesion(read, options_);
+    laws_ = PairTable<dembark::ContactParameters>(read.types());
+    for (int i = 1; i <= read.types(); ++i)
+      for (int j = 1; j <= read.types(); ++j) {
+        dembark::ContactParameters& p = laws_(i, j);
+        p.elasticity.effective_youngs_modulus = youngs_modulus[i][j];
+        p.elasticity.effective_shear_modulus = shear_modulus[i][j];
+        p.elasticity.damping = damping_factor[i][j];
+        p.tangential_damping = options_.tangential_damping;
+        p.limit_force = options_.limit_force;
+        p.friction = friction(i, j);
+        if (options_.rolling_model != dembark::RollingModel::off) p.rolling = rolling(i, j);
+        if (cohesive && plain_settings_) p.cohesion = cohesion(i, j);
+      }
   }
 
   dembark::ContactParameters parameters(int i, int j) const override { return laws_(i, j); }

@@ -46,10 +46,11 @@ void FixIntegrationMonitor::find_contacts() {
   if (!hertz_ && !pair_->contact_match("normal", "hooke"))
     fail("it knows the stiffness of model hertz or hooke only; the pair style has another model");
   const dembark_liggghts::PropertyReader read(force->registry, modify, error, "fix integration/monitor");
-  if (!hertz_) characteristic_velocity_ = read.scalar("characteristicVelocity");
-  moduli_ = for_all_pairs(read, [&](int i, int j, const std::string &) {
-    return dembark::effective_youngs_modulus(read.per_type("youngsModulus", i), read.per_type("poissonsRatio", i),
-                                             read.per_type("youngsModulus", j), read.per_type("poissonsRatio", j));
+  using dembark::ContactNumber;
+  if (!hertz_) characteristic_velocity_ = dembark_liggghts::PropertySource(read, 1, 1).number(ContactNumber::characteristic_velocity);
+  moduli_ = for_all_pairs(read, [](const dembark_liggghts::PropertySource &of) {
+    return dembark::effective_youngs_modulus(of.number(ContactNumber::youngs_modulus, 1), of.number(ContactNumber::poissons_ratio, 1),
+                                             of.number(ContactNumber::youngs_modulus, 2), of.number(ContactNumber::poissons_ratio, 2));
   });
 }
 

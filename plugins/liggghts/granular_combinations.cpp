@@ -139,7 +139,9 @@ Combination combination(std::int64_t hash) {
   for (std::size_t k = 0; k < models.size(); ++k) models[k] = (hash >> (6 * k)) & 63;
   return models;
 }
-bool is_ours(const Combination& models) { return models[1] == TANGENTIAL_FINNIE_RABINOWICZ || models[2] == COHESION_CAPILLARY; }
+bool is_ours(const Combination& models) {
+  return models[1] == TANGENTIAL_FINNIE_RABINOWICZ || models[2] == COHESION_CAPILLARY || models[2] == COHESION_ADHESION;
+}
 
 template <class Host>
 Host* fallback_or_refuse(LAMMPS* lammps, typename Host::ParentType* parent, std::int64_t hash) {
@@ -250,6 +252,7 @@ void enter_combinations() {
   ContactModels::Factory& models = ContactModels::Factory::instance();
   models.addTangentialModel("finnie_rabinowicz", TANGENTIAL_FINNIE_RABINOWICZ);
   models.addCohesionModel("capillary", COHESION_CAPILLARY);
+  models.addCohesionModel("adhesion", COHESION_ADHESION);
 
 #define MODELS(...) Models<__VA_ARGS__>()
 #define GRAN_MODELS(normal, tangential, cohesion, rolling, surface) \

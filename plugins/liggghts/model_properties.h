@@ -5,7 +5,9 @@
 
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "atom.h"
@@ -19,6 +21,7 @@
 #include "dembark/capillary/bridge_law.hpp"
 #include "dembark/contact.hpp"
 #include "dembark/pair_table.hpp"
+#include "dembark/parameters/contact_parameters.hpp"
 #include "engine_access.h"
 
 namespace dembark_liggghts {
@@ -124,82 +127,74 @@ class PropertyReader {
 
   void fail(const std::string& what) const { error_->all(FLERR, (model_ + ": " + what).c_str()); }
 
-  /// Whether a table of pairs of types is there.
-  bool given(const char* name) const { return find(name, "peratomtypepair", false); }
-
-  // A value that is not given is `otherwise`, or an error where that is NAN.
-  double scalar(const char* name, double otherwise = NAN) const {
-    LAMMPS_NS::FixPropertyGlobal* const fix = find(name, "scalar", std::isnan(otherwise));
-    return fix ? fix->compute_scalar() : otherwise;
-  }
-  double per_type(const char* name, int type) const { return find(name, "peratomtype", true)->compute_vector(type - 1); }
-  double per_pair(const char* name, int i, int j, double otherwise = NAN) const {
-    LAMMPS_NS::FixPropertyGlobal* const fix = find(name, "peratomtypepair", std::isnan(otherwise));
-    if (!fix) return otherwise;
+  /// Of a pair of types, or of type i; NAN where it is not given, or an error where it is `required`. A contact angle is the mean of the
+  /// two types.
+  double value(const dembark::Parameter& p, int i, int j, bool required) const {
+    const std::string name = this->name(p);
+    if (p.scope == dembark::Scope::global) {
+      LAMMPS_NS::FixPropertyGlobal* const fix = find(name.c_str(), "scalar", required);
+      return fix ? fix->compute_scalar() : NAN;
+    }
+    if (p.scope == dembark::Scope::type) {
+      LAMMPS_NS::FixPropertyGlobal* const fix = find(name.c_str(), "peratomtype", required);
+      return fix ? fix->compute_vector(i - 1) : NAN;
+    }
+    if (&p == &parameter(dembark::ContactNumber::contact_angle)) {
+      LAMMPS_NS::FixPropertyGlobal* const fix = find(name.c_str(), "peratomtype", required);
+      return fix ? 0.5 * (fix->compute_vector(i - 1) + fix->compute_vector(j - 1)) : NAN;
+    }
+    LAMMPS_NS::FixPropertyGlobal* const fix = find(name.c_str(), "peratomtypepair", required);
+    if (!fix) return NAN;
     const double value = fix->compute_array(i - 1, j - 1);
     if (value != fix->compute_array(j - 1, i - 1))
-      fail(std::string(name) + " differs between types " + std::to_string(i) + "-" + std::to_string(j) + " and " + std::to_string(j) + "-" +
+      fail(name + " differs between types " + std::to_string(i) + "-" + std::to_string(j) + " and " + std::to_string(j) + "-" +
            std::to_string(i) + "; the table of a pair property has to be symmetric");
     return value;
   }
+  static std::string name(const dembark::Parameter& p) { return p.liggghts ? p.liggghts : dembark::camel_case(p.name); }
 };
 
-/// The laws of all pairs of types, each as `law(i, j, "i-j")` makes it.
+/// The numbers of one pair of types, for dembark::read_friction() and its like.
+class PropertySource : public dembark::ContactSource {
+  const PropertyReader& read_;
+  const int i_, j_;
+
+ public:
+  PropertySource(const PropertyReader& read, int i, int j) : read_(read), i_(i), j_(j) {}
+  std::string name(const dembark::Parameter& p) const override { return PropertyReader::name(p); }
+  double given(const dembark::Parameter& p, int body) const override { return read_.value(p, body == 1 ? i_ : j_, j_, false); }
+  [[noreturn]] void missing(const dembark::Parameter& p, int body) const override {
+    read_.value(p, body == 1 ? i_ : j_, j_, true);
+    std::abort();  // the line before has ended the run
+  }
+  [[noreturn]] void wrong(const std::string& line) const override {
+    read_.fail(line + " (types " + std::to_string(i_) + "-" + std::to_string(j_) + ")");
+    std::abort();
+  }
+};
+
+/// The laws of all pairs of types, each as `law(source)` makes it.
 template <class Law>
 auto for_all_pairs(const PropertyReader& read, Law law) {
-  PairTable<decltype(law(1, 1, std::string()))> laws(read.types());
+  PairTable<decltype(law(std::declval<const PropertySource&>()))> laws(read.types());
   for (int i = 1; i <= read.types(); ++i)
-    for (int j = 1; j <= read.types(); ++j) laws(i, j) = law(i, j, std::to_string(i) + "-" + std::to_string(j));
+    for (int j = 1; j <= read.types(); ++j) laws(i, j) = law(PropertySource(read, i, j));
   return laws;
 }
 
-inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& read, dembark::Presliding presliding,
-                                                          dembark::FrictionLimit friction_limit) {
-  return for_all_pairs(read, [&](int i, int j, const std::string& pair) {
-    dembark::FinnieRabinowicz law;
-    law.static_friction = read.per_pair("staticFriction", i, j);
-    law.kinetic_friction = read.per_pair("kineticFriction", i, j);
-    law.critical_slip_distance = read.per_pair("criticalSlipDistance", i, j);
-    law.interface_shear_strength = read.per_pair("interfaceShearStrength", i, j, dembark::unlimited_strength);
-    law.healing_time = read.scalar("healingTime", 0.0);
-    law.presliding = presliding;
-    law.friction_limit = friction_limit;
-    if (law.error()) read.fail(std::string(law.error()) + " (types " + pair + ")");
-    return law;
-  });
+inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& read, const dembark::ContactOptions& options) {
+  return for_all_pairs(read, [&](const PropertySource& source) { return dembark::read_friction(options, source); });
 }
 
-inline PairTable<dembark::RollingResistance> read_rolling(const PropertyReader& read, dembark::RollingModel model) {
-  return for_all_pairs(read, [&](int i, int j, const std::string& pair) {
-    dembark::RollingResistance law{model, read.per_pair("coefficientRollingFriction", i, j), 0.0};
-    if (model == dembark::RollingModel::elastic_plastic) law.damping_ratio = read.per_pair("coefficientRollingViscousDamping", i, j, 0.0);
-    if (law.error()) read.fail(std::string(law.error()) + " (types " + pair + ")");
-    return law;
-  });
+inline PairTable<dembark::RollingResistance> read_rolling(const PropertyReader& read, const dembark::ContactOptions& options) {
+  return for_all_pairs(read, [&](const PropertySource& source) { return dembark::read_rolling(options, source); });
 }
 
-/// `carried`: bridges take their volume from the grains, none is given.
-inline PairTable<dembark::Liquid> read_liquids(const PropertyReader& read, dembark::capillary::Model model, bool viscous, bool carried) {
-  dembark::Liquid same;
-  same.surface_tension = read.scalar("surfaceTension");
-  if (!(same.surface_tension >= 0.0 && same.surface_tension < INFINITY)) read.fail("surfaceTension (N/m) must be >= 0 and finite");
-  same.viscous.viscosity = viscous ? read.scalar("liquidViscosity") : read.scalar("liquidViscosity", 0.0);
-  if (!viscous && same.viscous.viscosity != 0.0)
+inline PairTable<dembark::Cohesion> read_cohesion(const PropertyReader& read, const dembark::ContactOptions& options) {
+  const dembark::Parameter& viscosity = parameter(dembark::ContactNumber::liquid_viscosity);
+  if (options.cohesion == dembark::CohesionLaw::bridge && !options.viscous && read.value(viscosity, 1, 1, false) > 0.0)
     read.fail("liquidViscosity is given, but viscous forces are off; write 'viscous_liquid on' after the models, or leave it out");
-  if (viscous) same.viscous.minimum_gap = read.scalar("minimumGap");
-  if (const char* wrong = same.viscous.error()) read.fail(std::string("liquidViscosity, minimumGap: ") + wrong);
-  return for_all_pairs(read, [&](int i, int j, const std::string& pair) {
-    dembark::Liquid liquid = same;
-    if (!carried) liquid.bridge_volume = read.per_pair("bridgeVolume", i, j);
-    if (!(liquid.bridge_volume >= 0.0 && liquid.bridge_volume < INFINITY))
-      read.fail("bridgeVolume (m^3) must be >= 0 and finite (types " + pair + ")");
-    const double angle = 0.5 * (read.per_type("contactAngle", i) + read.per_type("contactAngle", j));
-    if (!(angle >= 0.0 && angle <= 0.5 * dembark::pi))
-      read.fail("contactAngle is in radians (stock models take degrees) and must lie in 0...pi/2; the mean of types " + std::to_string(i) +
-                " and " + std::to_string(j) + " is " + std::to_string(angle));
-    liquid.force = &dembark::capillary::shared_bridge_force(model, angle);
-    return liquid;
-  });
+  return for_all_pairs(read, [&](const PropertySource& source) { return dembark::read_cohesion(options, source); });
 }
 
 }  // namespace dembark_liggghts

@@ -84,12 +84,15 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   void connectToProperties(PropertyRegistry& registry) {
     const dembark_liggghts::PropertyReader read(registry, modify, error, "tangential finnie_rabinowicz");
-    laws_ = dembark_liggghts::read_friction(read, static_cast<dembark::Presliding>(presliding_),
-                                            static_cast<dembark::FrictionLimit>(friction_limit_));
+    dembark::ContactOptions options;
+    options.presliding = static_cast<dembark::Presliding>(presliding_);
+    options.friction_limit = static_cast<dembark::FrictionLimit>(friction_limit_);
+    options.rolling_model = rolling_model();
+    laws_ = dembark_liggghts::read_friction(read, options);
     if (rolling_model() != dembark::RollingModel::off) {
       if (!matches("rolling_friction", "off"))
         read.fail("rolling_resistance and the model rolling_friction are both on; leave one of them out");
-      rolling_ = dembark_liggghts::read_rolling(read, rolling_model());
+      rolling_ = dembark_liggghts::read_rolling(read, options);
     }
     tally_ = dembark_liggghts::find_energy_tally(modify);
     exponent_ = matches("normal", "hertz") ? 1.5 : 1.0;

@@ -1,14 +1,15 @@
-// One whole contact: kinematics, normal force, Finnie-Rabinowicz friction, rolling resistance and liquid bridge, for two spheres or a
-// sphere and a wall.
+// One contact: kinematics, normal force, Finnie-Rabinowicz friction, rolling resistance and cohesion, for two spheres or a sphere and a
+// wall.
 //
 // contact_step() is the contact as YADE and Python have it. An engine that computes contacts model by model (LIGGGHTS), or many at once,
-// calls the stages that it is made of: surface_motion(), hertz() or hooke() and adjusted(), contact_friction(), bridge_step() and
+// calls the stages that it is made of: surface_motion(), hertz() or hooke() and adjusted(), contact_friction(), cohesion_step() and
 // bridge_resistance(), assemble(), rolling_step() and add_couple().
 //
 // Conventions: the unit normal points from body 2 to body 1; forces are those on body 1. A wall is body 2 with an infinite radius
 // and an infinite mass; its position and velocity are those of its surface at the contact, and it turns by `wall_spin`. Lever arms reach
 // to the middle of the overlap, r - delta/2 (LIGGGHTS-PUBLIC 3.8.0, `surface default`), -delta/2 from the surface of a wall, and to the
-// middle of the gap of a bridge that resists sliding.
+// middle of the gap of a bridge that resists sliding. Cohesion does not change the springs: the tangential spring and the area of contact
+// are those of the normal law at the same overlap, and the limit of friction follows the normal law without the attraction.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "capillary/bridge.hpp"
-#include "capillary/viscous.hpp"
+#include "cohesion/cohesion.hpp"
 #include "finnie_rabinowicz.hpp"
 #include "kinematics.hpp"
 #include "normal_force.hpp"
@@ -35,19 +35,6 @@ bool option_from_name(const std::vector<std::string>& names, const std::string& 
   return found != names.end();
 }
 
-/// Liquid of a contact; no bridge ever forms when `force` is null or the volume is zero.
-struct Liquid {
-  const capillary::BridgeForce* force = nullptr;  ///< built for the contact's mean contact angle
-  double surface_tension = 0.0;                   ///< N/m
-  double bridge_volume = 0.0;                     ///< m^3, of each bridge that forms
-  capillary::ViscousLiquid viscous{};
-
-  /// Largest time step (s) with which a bridge between these bodies can be integrated.
-  DEMBARK_FUNCTION double stable_time_step(double effective_radius, double effective_mass) const {
-    return viscous.on() ? capillary::viscous_time_step(viscous, 2.0 * effective_radius, effective_mass) : INFINITY;
-  }
-};
-
 struct ContactParameters {
   NormalLaw normal_law = NormalLaw::hertz;
   HertzParameters elasticity{};          ///< E*, G* (Hertz only) and damping
@@ -55,7 +42,7 @@ struct ContactParameters {
   bool tangential_damping = true;
   bool limit_force = false;  ///< no attraction by damping: F >= 0
   FinnieRabinowicz friction{};
-  Liquid liquid{};
+  Cohesion cohesion{};
   RollingResistance rolling{};
 
   /// The normal law, as it is without the switches above. Two held bodies, whose effective mass is infinite, have no impact that damping or
@@ -76,10 +63,9 @@ struct ContactParameters {
 /// What an engine stores per contact, from touching to the end of contact and bridge.
 struct ContactState {
   FrictionState<double> friction{};
-  double bridge_volume = 0.0;     ///< m^3; 0 = no bridge
-  double rupture_distance = 0.0;  ///< m, of the bridge that is there
-  SlipRings rings{};              ///< for Presliding::partial_slip
-  Vec3<double> rolling_angle{};   ///< rad, for RollingModel::elastic_plastic
+  CohesionState cohesion{};
+  SlipRings rings{};             ///< for Presliding::partial_slip
+  Vec3<double> rolling_angle{};  ///< rad, for RollingModel::elastic_plastic
 };
 
 /// The two bodies as an engine sees them. `separation` = position of 1 minus position of 2 (minus the nearest wall point),
@@ -99,11 +85,11 @@ struct ContactBodies {
 };
 
 struct ContactForce {
-  bool interacting = false;                                   ///< touching, or held by a bridge: the engine has to keep the contact
+  bool interacting = false;                                   ///< touching, or held over a gap: the engine has to keep the contact
   Vec3<double> normal{};                                      ///< unit, from 2 to 1
   double overlap = 0.0;                                       ///< m, negative = gap
-  double normal_force = 0.0;                                  ///< N, repulsive force of the normal law, without the bridge
-  double capillary_force = 0.0;                               ///< N, positive = attractive
+  double normal_force = 0.0;                                  ///< N, repulsive force of the normal law, without cohesion
+  double cohesive_force = 0.0;                                ///< N, of a bridge or of adhesion, positive = attractive
   Vec3<double> tangential{};                                  ///< N, on body 1, friction
   double normal_stiffness = 0.0, tangential_stiffness = 0.0;  ///< N/m, of the springs at this overlap; 0 apart
   double viscous_normal = 0.0;                                ///< N, of the liquid, on body 1 along the normal
@@ -134,20 +120,6 @@ DEMBARK_FUNCTION inline Vec3<double> contact_friction(const FinnieRabinowicz& la
                        state);
 }
 
-/// Attraction (N) of the bridge between spheres of these radii (m; infinite = a wall): it forms at the touch, holds on over the gap (m, < 0
-/// = overlap) and ruptures beyond its distance. `volume` (m^3, 0 = no bridge) and `rupture_distance` (m) are its state.
-DEMBARK_FUNCTION inline double bridge_step(const Liquid& liquid, double radius_1, double radius_2, double gap, bool touching,
-                                           double& volume, double& rupture_distance) {
-  if (!(volume > 0.0)) {
-    if (!touching || !liquid.force || !(liquid.bridge_volume > 0.0)) return 0.0;
-    volume = liquid.bridge_volume;
-    rupture_distance = liquid.force->rupture_distance(radius_1, radius_2, volume);
-  }
-  if (liquid.force && !(gap > rupture_distance)) return liquid.force->force(radius_1, radius_2, gap, volume, liquid.surface_tension);
-  volume = rupture_distance = 0.0;
-  return 0.0;
-}
-
 /// What the liquid of a bridge of `volume` (m^3) resists with, into `out`.
 DEMBARK_FUNCTION inline void bridge_resistance(const Liquid& liquid, const ContactBodies& b, double volume, const RelativeMotion& motion,
                                                ContactForce& out) {
@@ -161,7 +133,7 @@ DEMBARK_FUNCTION inline void assemble(const RelativeMotion& motion, ContactForce
   const Vec3<double> along_surface = out.tangential + out.viscous_tangential, moment = cross(out.normal, along_surface);
   out.torque_1 = -motion.arm_1 * moment;
   out.torque_2 = -motion.arm_2 * moment;
-  out.force = (out.normal_force - out.capillary_force + out.viscous_normal) * out.normal + along_surface;
+  out.force = (out.normal_force - out.cohesive_force + out.viscous_normal) * out.normal + along_surface;
 }
 
 /// The couple of rolling resistance, into what is assembled.
@@ -180,12 +152,14 @@ DEMBARK_FUNCTION inline ContactForce contact_step(const ContactParameters& p, co
   out.normal = b.separation * (1.0 / distance);
 
   const bool touching = out.overlap > 0.0;
-  out.capillary_force = bridge_step(p.liquid, b.radius_1, b.radius_2, -out.overlap, touching, state.bridge_volume, state.rupture_distance);
-  const bool viscous = p.liquid.viscous.on() && state.bridge_volume > 0.0;
+  out.cohesive_force =
+      cohesion_step(p.cohesion, {b.radius_1, b.radius_2, -out.overlap, touching, p.elasticity.effective_youngs_modulus}, state.cohesion);
+  const Liquid& liquid = p.cohesion.liquid;
+  const bool viscous = liquid.viscous.on() && state.cohesion.bridge_volume > 0.0;
   RelativeMotion motion;
   Vec3<double> couple{};
   if (touching || viscous) motion = relative_motion(b, out.normal, out.overlap);
-  if (viscous) bridge_resistance(p.liquid, b, state.bridge_volume, motion, out);
+  if (viscous) bridge_resistance(liquid, b, state.cohesion.bridge_volume, motion, out);
 
   if (touching) {
     const NormalResponse<double> response = adjusted(
@@ -208,7 +182,7 @@ DEMBARK_FUNCTION inline ContactForce contact_step(const ContactParameters& p, co
   }
   assemble(motion, out);
   if (p.rolling.on()) add_couple(couple, out);
-  out.interacting = touching || state.bridge_volume > 0.0;
+  out.interacting = touching || state.cohesion.held();
   return out;
 }
 

@@ -46,7 +46,7 @@ enum class ContactPart {
   normal_viscous,      ///< normal damping, and what `limit_force` cuts off
   tangential_elastic,  ///< tangential spring, slip included
   tangential_viscous,  ///< tangential damping
-  capillary,           ///< liquid bridge
+  cohesive,            ///< liquid bridge or adhesion
   liquid_viscous,      ///< what the liquid of a bridge resists with
   rolling_elastic,     ///< spring of rolling resistance, yielding included
   rolling_viscous,     ///< its dashpot, or the whole of a constant torque
@@ -114,9 +114,9 @@ DEMBARK_FUNCTION inline void split_rolling(ContactParts& parts, const Vec3<doubl
   parts.rolling_stored = 0.5 * stiffness * dot(angle, angle);
 }
 
-/// What the liquid of a bridge does.
-DEMBARK_FUNCTION inline void split_bridge(ContactParts& parts, const ContactForce& force) {
-  parts[ContactPart::capillary] = -force.capillary_force * force.normal;
+/// Attraction, and what the liquid of a bridge resists with.
+DEMBARK_FUNCTION inline void split_cohesion(ContactParts& parts, const ContactForce& force) {
+  parts[ContactPart::cohesive] = -force.cohesive_force * force.normal;
   parts[ContactPart::liquid_viscous] = force.viscous_normal * force.normal + force.viscous_tangential;
 }
 
@@ -124,7 +124,7 @@ DEMBARK_FUNCTION inline void split_bridge(ContactParts& parts, const ContactForc
 DEMBARK_FUNCTION inline ContactParts contact_parts(const ContactParameters& p, const ContactBodies& bodies, const ContactForce& force,
                                                    const ContactState& state) {
   ContactParts parts;
-  split_bridge(parts, force);
+  split_cohesion(parts, force);
   if (!(force.overlap > 0.0)) return parts;
 
   // At rest there is no damping: what is left of the law is its spring.

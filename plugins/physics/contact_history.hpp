@@ -26,16 +26,32 @@ DEMBARK_FUNCTION inline SlipRings load_rings(const double* row) {
 }
 DEMBARK_FUNCTION inline void store_rings(double* row, const SlipRings& rings) { std::memcpy(row, &rings, sizeof rings); }
 
+/// Cohesion: two numbers.
+static_assert(sizeof(CohesionState) == 2 * sizeof(double));
+DEMBARK_FUNCTION inline CohesionState load_cohesion(const double* row) { return {row[0], row[1]}; }
+DEMBARK_FUNCTION inline void store_cohesion(double* row, const CohesionState& state) {
+  row[0] = state.bridge_volume;
+  row[1] = state.rupture_distance;
+}
+
+/// cohesion_step() with a state in a row of numbers.
+DEMBARK_FUNCTION inline double cohesion_step(const Cohesion& cohesion, const CohesionContact& contact, double* row) {
+  CohesionState state = load_cohesion(row);
+  const double attraction = cohesion_step(cohesion, contact, state);
+  store_cohesion(row, state);
+  return attraction;
+}
+
 /// Which parts of a ContactState stand in a row, one after the other: friction always, then those that are switched on.
 struct HistoryLayout {
-  bool bridge = false, rings = false, rolling = false;
+  bool cohesion = false, rings = false, rolling = false;
   bool imbalance = false;  ///< of carried liquid (capillary/liquid.hpp), which load() and store() leave alone
 
   /// Another number for each layout.
-  DEMBARK_FUNCTION int code() const { return bridge + 2 * rings + 4 * rolling + 8 * imbalance; }
+  DEMBARK_FUNCTION int code() const { return cohesion + 2 * rings + 4 * rolling + 8 * imbalance; }
 
-  DEMBARK_FUNCTION int bridge_at() const { return 5; }
-  DEMBARK_FUNCTION int rings_at() const { return bridge_at() + (bridge ? 2 : 0); }
+  DEMBARK_FUNCTION int cohesion_at() const { return 5; }
+  DEMBARK_FUNCTION int rings_at() const { return cohesion_at() + (cohesion ? 2 : 0); }
   DEMBARK_FUNCTION int rolling_at() const { return rings_at() + (rings ? ring_numbers : 0); }
   DEMBARK_FUNCTION int imbalance_at() const { return rolling_at() + (rolling ? 3 : 0); }
   DEMBARK_FUNCTION int size() const { return imbalance_at() + (imbalance ? 1 : 0); }
@@ -43,20 +59,14 @@ struct HistoryLayout {
   /// `state` must be a new one where its other parts are asked for.
   DEMBARK_HOT void load(const double* row, ContactState& state) const {
     state.friction = load_friction(row);
-    if (bridge) {
-      state.bridge_volume = row[bridge_at()];
-      state.rupture_distance = row[bridge_at() + 1];
-    }
+    if (cohesion) state.cohesion = load_cohesion(row + cohesion_at());
     if (rings) state.rings = load_rings(row + rings_at());
     if (rolling) std::memcpy(static_cast<void*>(&state.rolling_angle), row + rolling_at(), sizeof state.rolling_angle);
   }
 
   DEMBARK_HOT void store(double* row, const ContactState& state) const {
     store_friction(row, state.friction);
-    if (bridge) {
-      row[bridge_at()] = state.bridge_volume;
-      row[bridge_at() + 1] = state.rupture_distance;
-    }
+    if (cohesion) store_cohesion(row + cohesion_at(), state.cohesion);
     if (rings) store_rings(row + rings_at(), state.rings);
     if (rolling) std::memcpy(row + rolling_at(), &state.rolling_angle, sizeof state.rolling_angle);
   }

@@ -42,12 +42,6 @@ struct RollingResistance {
   double damping_ratio = 0.0;  ///< eta, >= 0, of (2); 1 = critical
 
   DEMBARK_FUNCTION bool on() const { return model != RollingModel::off && friction > 0.0; }
-  /// The one clear line about what is wrong with these parameters, or nullptr.
-  const char* error() const {
-    if (!(friction >= 0.0) || std::isinf(friction)) return "rolling friction must be a number >= 0";
-    if (!(damping_ratio >= 0.0) || std::isinf(damping_ratio)) return "rolling damping ratio must be a number >= 0";
-    return nullptr;
-  }
 };
 
 /// I (kg m^2) of two spheres of these masses (kg; infinite = a wall, or held) and radii (m).

@@ -13,6 +13,7 @@
 
 #include "dembark/capillary/bridge_law.hpp"
 #include "dembark/contact.hpp"
+#include "dembark/parameters/contact_parameters.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -85,6 +86,33 @@ NB_MODULE(_physics, m) {
   nb::set_leak_warnings(false);  // cached laws live until the interpreter is gone, which is no leak
   m.attr("unlimited_strength") = unlimited_strength;
   m.def("capillary_models", &capillary::model_names);
+  m.def("cohesion_laws", &cohesion_names);
+  m.def("contact_parameters", [] {
+    static const char* const scopes[] = {"global", "type", "pair"};
+    nb::list all;
+    for (const Parameter& p : contact_parameters) {
+      nb::dict row;
+      row["name"] = p.name;
+      row["camel_case"] = camel_case(p.name);
+      row["liggghts"] = p.liggghts ? std::string(p.liggghts) : camel_case(p.name);
+      row["unit"] = p.unit;
+      row["low"] = p.low;
+      row["low_open"] = p.above_low;
+      row["high"] = p.high;
+      row["infinite"] = p.infinite;
+      row["default"] = p.otherwise;
+      row["scope"] = scopes[static_cast<int>(p.scope)];
+      row["range"] = range_text(p);
+      row["doc"] = p.doc;
+      all.append(row);
+    }
+    return all;
+  });
+  m.def("jkr_contact_radius", &jkr_contact_radius);
+  m.def("jkr_force", &jkr_force);
+  m.def("jkr_attraction", &jkr_attraction);
+  m.def("jkr_rupture_distance", &jkr_rupture_distance);
+  m.def("jkr_loss", &jkr_loss);
 
   nb::class_<capillary::BridgeLaw>(m, "BridgeForce")
       .def(
@@ -168,16 +196,15 @@ NB_MODULE(_physics, m) {
   nb::class_<RollingResistance>(m, "RollingResistance")
       .def("__init__", [](RollingResistance* self, const std::string& model, double friction, double damping_ratio) {
         const RollingResistance law{option_of<RollingModel>("rolling resistance", rolling_names(), model), friction, damping_ratio};
-        if (law.error()) throw std::invalid_argument(law.error());
         new (self) RollingResistance(law);
       });
 
   nb::class_<Contact>(m, "Contact")
       .def("__init__",
            [](Contact* self, const std::string& normal_law, double youngs, double shear, double restitution, double characteristic_velocity,
-              bool tangential_damping, bool limit_force, const FinnieRabinowicz& friction, const std::string& capillary_model,
-              double contact_angle, double surface_tension, double bridge_volume, double viscosity, double minimum_gap,
-              const RollingResistance& rolling) {
+              bool tangential_damping, bool limit_force, const FinnieRabinowicz& friction, const RollingResistance& rolling,
+              const std::string& cohesion, double cohesive_force, double work_of_adhesion, const std::string& capillary_model,
+              double contact_angle, double surface_tension, double bridge_volume, double viscosity, double minimum_gap) {
              new (self) Contact{{option_of<NormalLaw>("normal law", normal_law_names(), normal_law),
                                  {youngs, shear, restitution},
                                  characteristic_velocity,
@@ -186,10 +213,11 @@ NB_MODULE(_physics, m) {
                                  friction,
                                  {},
                                  rolling}};
-             if (bridge_volume > 0.0) {
-               self->bridge = std::make_shared<capillary::BridgeLaw>(bridge_law(capillary_model, contact_angle));
-               self->parameters.liquid = {self->bridge.get(), surface_tension, bridge_volume, {viscosity, minimum_gap}};
-             }
+             const auto law = option_of<CohesionLaw>("cohesion", cohesion_names(), cohesion);
+             self->parameters.cohesion = {law, {}, cohesive_force, work_of_adhesion};
+             if (law != CohesionLaw::bridge) return;
+             self->bridge = std::make_shared<capillary::BridgeLaw>(bridge_law(capillary_model, contact_angle));
+             self->parameters.cohesion.liquid = {self->bridge.get(), surface_tension, bridge_volume, {viscosity, minimum_gap}};
            })
       .def("step",
            [](Contact& self, const nb::tuple& separation, const nb::tuple& v1, const nb::tuple& v2, const nb::tuple& w1,
@@ -206,11 +234,11 @@ NB_MODULE(_physics, m) {
                throw std::invalid_argument(
                    "the contact has no finite force: positions, velocities, radii, masses and the time step must be finite numbers");
              }
-             return nb::make_tuple(tuple(f.force), tuple(f.torque_1), tuple(f.torque_2), f.overlap, f.normal_force, f.capillary_force,
+             return nb::make_tuple(tuple(f.force), tuple(f.torque_1), tuple(f.torque_2), f.overlap, f.normal_force, f.cohesive_force,
                                    tuple(f.tangential), f.viscous_normal, tuple(f.viscous_tangential), f.interacting, tuple(f.rolling));
            })
       .def_prop_ro("slip", [](const Contact& self) { return self.state.friction.slip; })
       .def_prop_ro("dissipated_energy", [](const Contact& self) { return self.state.friction.dissipated_energy; })
       .def_prop_ro("rolling_angle", [](const Contact& self) { return tuple(self.state.rolling_angle); })
-      .def_prop_ro("bridge_volume", [](const Contact& self) { return self.state.bridge_volume; });
+      .def_prop_ro("bridge_volume", [](const Contact& self) { return self.state.cohesion.bridge_volume; });
 }

@@ -113,12 +113,16 @@ ContactPacks::Vec3 ContactPacks::friction(const Block& b, int k, const Vec3& nor
 	return force;
 }
 
-void ContactPacks::bridges(const Block& b, int first, int count, const double* gap, double* capillaryForce) {
+void ContactPacks::bridges(const Block& b, int first, int count, const double* gap, double* cohesiveForce) {
 	for (int n = 0; n < count; ++n) {
-		FinnieRabinowiczPhys& data    = *phys[first + n];
-		const Real            radius1 = step.radius[b.grain[first + n]], radius2 = step.radius[b.partner[first + n]];
-		capillaryForce[n] = data.capillaryForce =
-			bridge_step(data.contact.liquid, radius1, radius2, gap[n], true, data.bridgeVolume, data.ruptureDistance);
+		FinnieRabinowiczPhys&               data    = *phys[first + n];
+		const Real                          radius1 = step.radius[b.grain[first + n]], radius2 = step.radius[b.partner[first + n]];
+		const ::dembark::ContactParameters& p = data.contact;
+		::dembark::CohesionState            state{data.bridgeVolume, data.ruptureDistance};
+		cohesiveForce[n] = data.capillaryForce =
+			cohesion_step(p.cohesion, {radius1, radius2, gap[n], true, p.elasticity.effective_youngs_modulus}, state);
+		data.bridgeVolume    = state.bridge_volume;
+		data.ruptureDistance = state.rupture_distance;
 	}
 }
 

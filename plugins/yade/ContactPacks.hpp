@@ -62,7 +62,7 @@ private:
 
 	Vec3 friction(const Block&, int k, const Vec3& normal, double twist, const ::dembark::NormalResponse<double>&,
 	              const Vec3& velocity) override;
-	void bridges(const Block&, int first, int count, const double* gap, double* capillaryForce) override;
+	void bridges(const Block&, int first, int count, const double* gap, double* cohesiveForce) override;
 	void store(const Block&, int first, int count, const ::dembark::PackResults&) override;
 
 	static const ::dembark::PairLoops& loops();

@@ -262,10 +262,10 @@ void EnergyAccount::recordContact(Contact& c, const Interaction& interaction) co
 	::dembark::ContactForce         force;
 	force.overlap            = bodies.radius_1 + (phys.wallBody ? 0.0 : bodies.radius_2) - distance;
 	force.normal             = distance > 0.0 ? bodies.separation * (1.0 / distance) : ::dembark::Vec3<Real>{0.0, 0.0, 1.0};
-	force.capillary_force    = phys.capillaryForce;
+	force.cohesive_force     = phys.capillaryForce;
 	force.viscous_normal     = phys.viscousForce;
 	force.viscous_tangential = on1(phys.viscousShearForce);
-	force.normal_force       = dot(along, force.normal) + force.capillary_force - force.viscous_normal;
+	force.normal_force       = dot(along, force.normal) + force.cohesive_force - force.viscous_normal;
 	force.tangential         = on1(phys.shearForce) - force.viscous_tangential;
 	force.rolling            = on1(phys.rollingTorque);
 

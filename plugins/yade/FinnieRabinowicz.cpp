@@ -55,13 +55,9 @@ const char* const useSetFriction =
 std::string pairName(const Material& a, const Material& b) { return "materials " + std::to_string(a.id) + " and " + std::to_string(b.id); }
 std::string pairName(const Body& a, const Body& b) { return "bodies " + std::to_string(a.getId()) + " and " + std::to_string(b.getId()); }
 
-/// Value of a pair parameter; one that was not given is `fallback`, or an error when that is NaN.
-double pairValue(const shared_ptr<MatchMaker>& maker, const char* name, const Material& a, const Material& b, double fallback = NaN) {
-	const std::string attribute = ip2 + name;
-	if (!maker) {
-		if (!std::isnan(fallback)) return fallback;
-		fail(attribute + " is not set; give it a number or a MatchMaker");
-	}
+/// Value of a pair parameter; NaN where none was given.
+double pairValue(const shared_ptr<MatchMaker>& maker, const std::string& attribute, const Material& a, const Material& b) {
+	if (!maker) return NaN;
 	double value = NaN;
 	try {
 		value = (*maker)(a.id, b.id);
@@ -70,6 +66,52 @@ double pairValue(const shared_ptr<MatchMaker>& maker, const char* name, const Ma
 	if (std::isnan(value)) fail(attribute + " has no value for " + pairName(a, b) + "; add the pair to its MatchMaker.matches");
 	return value;
 }
+
+using ::dembark::ContactNumber;
+
+/// A number of a contact: where the Ip2 functor has it, and where the contact keeps it.
+struct Number {
+	ContactNumber          which;
+	shared_ptr<MatchMaker> Ip2::* ofPair;
+	Real Ip2::* ofAll;
+	Real Phys::* kept;
+};
+const Number numbers[] = {
+	{ContactNumber::restitution, &Ip2::restitution, nullptr, &Phys::restitution},
+	{ContactNumber::static_friction, &Ip2::staticFriction, nullptr, &Phys::staticFriction},
+	{ContactNumber::kinetic_friction, &Ip2::kineticFriction, nullptr, &Phys::kineticFriction},
+	{ContactNumber::critical_slip_distance, &Ip2::criticalSlipDistance, nullptr, &Phys::criticalSlipDistance},
+	{ContactNumber::interface_shear_strength, &Ip2::interfaceShearStrength, nullptr, &Phys::interfaceShearStrength},
+	{ContactNumber::rolling_friction, &Ip2::rollingFriction, nullptr, &Phys::rollingFriction},
+	{ContactNumber::rolling_damping_ratio, &Ip2::rollingDampingRatio, nullptr, &Phys::rollingDampingRatio},
+	{ContactNumber::bridge_volume, &Ip2::bridgeVolume, nullptr, &Phys::newBridgeVolume},
+	{ContactNumber::contact_angle, &Ip2::contactAngle, nullptr, &Phys::contactAngle},
+	{ContactNumber::cohesive_force, &Ip2::cohesiveForce, nullptr, &Phys::cohesiveForce},
+	{ContactNumber::work_of_adhesion, &Ip2::workOfAdhesion, nullptr, &Phys::workOfAdhesion},
+	{ContactNumber::surface_tension, nullptr, &Ip2::surfaceTension, &Phys::surfaceTension},
+	{ContactNumber::liquid_viscosity, nullptr, &Ip2::liquidViscosity, &Phys::liquidViscosity},
+	{ContactNumber::minimum_gap, nullptr, &Ip2::minimumGap, &Phys::minimumGap},
+	{ContactNumber::healing_time, nullptr, &Ip2::healingTime, &Phys::healingTime},
+};
+
+/// The numbers that a contact keeps, for dembark::read_friction() and its like. All are >= 0; below is: not given.
+class PhysSource : public ::dembark::ContactSource {
+	const Phys&       phys;
+	const std::string pair;
+
+public:
+	PhysSource(const Phys& contact, const std::string& bodies) : phys(contact), pair(bodies) {}
+	std::string name(const ::dembark::Parameter& p) const override { return ::dembark::camel_case(p.name); }
+	double      given(const ::dembark::Parameter& p, int) const override {
+		for (const Number& each : numbers)
+			if (&parameter(each.which) == &p) return phys.*each.kept >= 0.0 ? phys.*each.kept : NaN;
+		return NaN;
+	}
+	[[noreturn]] void missing(const ::dembark::Parameter& p, int) const override {
+		fail(ip2 + name(p) + " is not set; give it a number" + (p.scope == ::dembark::Scope::pair ? " or a MatchMaker" : ""));
+	}
+	[[noreturn]] void wrong(const std::string& line) const override { fail(line + ", " + pair); }
+};
 
 /// Sets `option` to the one of `names` that an attribute of the law holds.
 template <class Option>
@@ -92,7 +134,7 @@ void refuseForce(const Scene& scene, Body::id_t id1, Body::id_t id2) {
 
 int LawKinds::of(const ::dembark::ContactParameters& p) {
 	if (p.normal_law != ::dembark::NormalLaw::hertz || p.friction.presliding != ::dembark::Presliding::linear || p.rolling.on() ||
-	    p.liquid.viscous.on())
+	    p.cohesion.liquid.viscous.on())
 		return -1;
 	constexpr std::size_t most    = 64;
 	const auto            numbers = [](const ::dembark::HertzParameters& e, const ::dembark::FinnieRabinowicz& f) {
@@ -129,10 +171,9 @@ std::vector<::dembark::PackedCoefficients<double>> LawKinds::laws(double dt) {
 }  // namespace dembark_yade
 
 void Phys::get(::dembark::ContactState& now) const {
-	now.friction         = {vec(elasticDisplacement), slip, dissipatedEnergy};
-	now.bridge_volume    = bridgeVolume;
-	now.rupture_distance = ruptureDistance;
-	now.rolling_angle    = vec(rollingAngle);
+	now.friction      = {vec(elasticDisplacement), slip, dissipatedEnergy};
+	now.cohesion      = {bridgeVolume, ruptureDistance};
+	now.rolling_angle = vec(rollingAngle);
 	if (contact.friction.presliding != ::dembark::Presliding::partial_slip) return;
 	if (slipRings.size() == ringNumbers) std::memcpy(static_cast<void*>(&now.rings), slipRings.data(), sizeof now.rings);
 	else now.rings = {};
@@ -148,8 +189,8 @@ void Phys::setState(const ::dembark::ContactState& now) {
 	elasticDisplacement = vec(now.friction.displacement);
 	slip                = now.friction.slip;
 	dissipatedEnergy    = now.friction.dissipated_energy;
-	bridgeVolume        = now.bridge_volume;
-	ruptureDistance     = now.rupture_distance;
+	bridgeVolume        = now.cohesion.bridge_volume;
+	ruptureDistance     = now.cohesion.rupture_distance;
 	rollingAngle        = vec(now.rolling_angle);
 	if (contact.friction.presliding != ::dembark::Presliding::partial_slip) return;
 	slipRings.resize(ringNumbers);
@@ -186,41 +227,23 @@ void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& 
 		fail("FrictMat.poisson of " + pairName(a, b) + " must be > -1 and <= 0.5");
 	phys->effectiveYoungsModulus = ::dembark::effective_youngs_modulus(a.young, a.poisson, b.young, b.poisson);
 	phys->effectiveShearModulus  = ::dembark::effective_shear_modulus(a.young, a.poisson, b.young, b.poisson);
-	phys->restitution            = pairValue(restitution, "restitution", a, b);
-	if (!(phys->restitution > 0.0 && phys->restitution <= 1.0))
-		fail("restitution of " + pairName(a, b) + " is " + text(phys->restitution) + "; it must be > 0 and <= 1");
-
-	::dembark::FinnieRabinowicz law;
-	law.healing_time = phys->healingTime = healingTime;
-	law.static_friction = phys->staticFriction = pairValue(staticFriction, "staticFriction", a, b);
-	law.kinetic_friction = phys->kineticFriction = pairValue(kineticFriction, "kineticFriction", a, b);
-	law.critical_slip_distance = phys->criticalSlipDistance = pairValue(criticalSlipDistance, "criticalSlipDistance", a, b);
-	law.interface_shear_strength = pairValue(interfaceShearStrength, "interfaceShearStrength", a, b, ::dembark::unlimited_strength);
-	// An infinite number would not survive saving to XML.
-	phys->interfaceShearStrength = std::min(law.interface_shear_strength, 1e300);
-	if (const char* wrong = law.error()) fail(std::string(wrong) + ", " + pairName(a, b));
-
-	// The law knows whether they are wanted.
-	const ::dembark::RollingResistance resistance{
-		::dembark::RollingModel::off, phys->rollingFriction = pairValue(rollingFriction, "rollingFriction", a, b, 0.0),
-		phys->rollingDampingRatio = pairValue(rollingDampingRatio, "rollingDampingRatio", a, b, 0.0)};
-	if (const char* wrong = resistance.error()) fail(std::string(wrong) + ", " + pairName(a, b));
-	phys->rolls = static_cast<bool>(rollingFriction);
-
-	phys->newBridgeVolume = pairValue(bridgeVolume, "bridgeVolume", a, b, 0.0);
-	if (!(phys->newBridgeVolume >= 0.0 && phys->newBridgeVolume < INFINITY))
-		fail("bridgeVolume of " + pairName(a, b) + " is " + text(phys->newBridgeVolume) + "; it must be >= 0 m^3 and finite");
-	phys->wettable = phys->newBridgeVolume > 0.0 || (contactAngle && !std::isnan(surfaceTension));
-	if (phys->wettable) {
-		if (!(surfaceTension >= 0.0 && surfaceTension < INFINITY))
-			fail(ip2 + "surfaceTension must be a finite number >= 0 N/m when bridgeVolume is > 0");
-		phys->surfaceTension = surfaceTension;
-		phys->contactAngle   = pairValue(contactAngle, "contactAngle", a, b);
-		if (const char* wrong = ::dembark::capillary::ViscousLiquid{liquidViscosity, minimumGap}.error())
-			fail(ip2 + "liquidViscosity, minimumGap: " + wrong);
-		phys->liquidViscosity = liquidViscosity;
-		phys->minimumGap      = minimumGap;
+	for (const Number& each : numbers) {
+		const ::dembark::Parameter& p     = parameter(each.which);
+		const std::string           name  = ::dembark::camel_case(p.name);
+		Real                        value = each.ofPair ? pairValue(this->*each.ofPair, ip2 + name, a, b) : this->*each.ofAll;
+		// A viscosity of 0 needs no gap.
+		if (std::isnan(value) || (each.which == ContactNumber::minimum_gap && value == 0.0)) {
+			if (p.required() && p.name == std::string("restitution"))
+				fail(ip2 + name + " is not set; give it a number or a MatchMaker");
+			// Without a volume materials are dry.
+			phys.get()->*each.kept = each.which == ContactNumber::bridge_volume ? 0.0 : p.required() ? -1.0 : p.otherwise;
+			continue;
+		}
+		if (const std::string wrong = ::dembark::wrong_value(p, name, value); !wrong.empty()) fail(wrong + ", " + pairName(a, b));
+		// An infinite number would not survive saving to XML.
+		phys.get()->*each.kept = std::min(value, 1e300);
 	}
+	read_friction({}, PhysSource(*phys, pairName(a, b)));
 	interaction->phys = phys;
 } catch (const std::exception& error) {
 	dembark_yade::postpone(*scene, error);
@@ -232,26 +255,32 @@ void Law2::postLoad(Law2&) {
 
 	std::vector<std::string> models = ::dembark::capillary::model_names();
 	models.insert(models.begin(), "none");
-	int chosen = 0;
-	choose("normalLaw", normalLaw, ::dembark::normal_law_names(), normal);
-	choose("presliding", presliding, ::dembark::presliding_names(), path);
-	choose("frictionLimit", frictionLimit, ::dembark::friction_limit_names(), load);
-	choose("rollingResistance", rollingResistance, ::dembark::rolling_names(), rolling);
+	int                       chosen = 0;
+	::dembark::ContactOptions now;
+	choose("normalLaw", normalLaw, ::dembark::normal_law_names(), now.normal_law);
+	choose("presliding", presliding, ::dembark::presliding_names(), now.presliding);
+	choose("frictionLimit", frictionLimit, ::dembark::friction_limit_names(), now.friction_limit);
+	choose("rollingResistance", rollingResistance, ::dembark::rolling_names(), now.rolling_model);
+	choose("cohesion", cohesion, ::dembark::cohesion_names(), now.cohesion);
 	choose("capillaryModel", capillaryModel, models, chosen);
-	wet     = chosen > 0;
-	model   = static_cast<::dembark::capillary::Model>(wet ? chosen - 1 : 0);
-	damped  = tangentialDamping;
-	limited = limitForce;
+	const bool dry = now.cohesion != ::dembark::CohesionLaw::none && now.cohesion != ::dembark::CohesionLaw::bridge;
+	if (chosen > 0 && dry) fail(law2 + "capillaryModel is for the cohesion 'bridge', not for '" + cohesion + "'");
+	if (chosen > 0) now.cohesion = ::dembark::CohesionLaw::bridge;
+	now.capillary_model    = static_cast<::dembark::capillary::Model>(chosen > 0 ? chosen - 1 : 0);
+	now.carried_liquid     = carriedLiquid;
+	now.tangential_damping = tangentialDamping;
+	now.limit_force        = limitForce;
+	options                = now;
 	// In this order: a contact that is prepared meanwhile has a kind of the new table, or is prepared again.
 	kinds.clear();
 	revision = -static_cast<double>(++revisions);
 }
 
 std::vector<::dembark::PackedCoefficients<double>> Law2::forPacks(::dembark::PairStep& step) {
-	step.wet                = wet;
-	step.limit_force        = limited;
-	step.tangential_damping = damped;
-	step.elastic_limit      = load == ::dembark::FrictionLimit::elastic;
+	step.wet                = options.cohesion != ::dembark::CohesionLaw::none;
+	step.limit_force        = options.limit_force;
+	step.tangential_damping = options.tangential_damping;
+	step.elastic_limit      = options.friction_limit == ::dembark::FrictionLimit::elastic;
 	return kinds.laws(step.dt);
 }
 
@@ -299,48 +328,34 @@ void Law2::prepare(Phys& phys, const Body& body1, const Body& body2) {
 		     " are both no spheres; the Finnie-Rabinowicz law knows a sphere with a sphere or with a wall");
 	phys.wallBody = sphere1 ? (sphere2 ? 0 : 2) : 1;
 
+	const PhysSource             source(phys, pairName(body1, body2));
+	const bool                   wet = options.cohesion == ::dembark::CohesionLaw::bridge;
 	::dembark::ContactParameters p;
-	p.normal_law              = normal;
+	p.normal_law              = options.normal_law;
 	p.elasticity              = {phys.effectiveYoungsModulus, phys.effectiveShearModulus, phys.restitution};
 	p.characteristic_velocity = characteristicVelocity;
-	p.tangential_damping      = damped;
-	p.limit_force             = limited;
-	p.friction                = {phys.staticFriction,
-	                             phys.kineticFriction,
-	                             phys.criticalSlipDistance,
-	                             phys.interfaceShearStrength,
-	                             phys.healingTime,
-	                             path,
-	                             load};
-	if (rolling != ::dembark::RollingModel::off && !phys.rolls)
-		fail(law2 + "rollingResistance='" + rollingResistance + "' needs " + ip2 +
-		     "rollingFriction; give it a number or a MatchMaker");
-	p.rolling = {rolling, phys.rollingFriction, phys.rollingDampingRatio};
-	if (carriedLiquid) {
-		if (!wet) fail(law2 + "carriedLiquid needs a capillaryModel other than none");
-		if (!phys.wettable) fail(law2 + "carriedLiquid needs " + ip2 + "surfaceTension and contactAngle");
-		if (phys.newBridgeVolume > 0.0)
-			fail(law2 + "carriedLiquid: " + ip2 + "bridgeVolume must not be given, bridges take what the bodies carry");
-	}
-	if (wet && (carriedLiquid || phys.newBridgeVolume > 0.0 || phys.bridgeVolume > 0.0)) try {
-			p.liquid = {&::dembark::capillary::shared_bridge_force(model, phys.contactAngle),
-			            phys.surfaceTension,
-			            phys.newBridgeVolume,
-			            {phys.liquidViscosity, phys.minimumGap}};
-		} catch (const std::exception& error) {
-			fail(ip2 + "contactAngle: " + error.what());
-		}
+	p.tangential_damping      = options.tangential_damping;
+	p.limit_force             = options.limit_force;
+	p.friction                = read_friction(options, source);
+	p.rolling                 = read_rolling(options, source);
+	if (carriedLiquid && !wet) fail(law2 + "carriedLiquid needs a capillaryModel other than none");
+	// Materials without a bridge volume stay dry among wet ones, until a bridge of theirs is read from a file.
+	::dembark::ContactOptions own = options;
+	if (wet && !carriedLiquid && !(phys.newBridgeVolume > 0.0) && !(phys.bridgeVolume > 0.0))
+		own.cohesion = ::dembark::CohesionLaw::none;
+	own.viscous  = phys.liquidViscosity > 0.0;
+	p.cohesion   = read_cohesion(own, source);
 	phys.contact = p;
 	// Packs do not write what the law would set to zero.
-	phys.kind = phys.wallBody || carriedLiquid || (phys.bridgeVolume > 0.0 && !p.liquid.force) ? -1 : kinds.of(p);
+	phys.kind = phys.wallBody || carriedLiquid || (phys.ruptureDistance > 0.0 && !p.cohesion.holds()) ? -1 : kinds.of(p);
 	if (phys.kind >= 0) {
 		phys.viscousForce  = 0.0;
 		phys.rollingTorque = Vector3r::Zero();
-		if (!wet) phys.capillaryForce = 0.0;
+		if (!p.cohesion.on()) phys.capillaryForce = 0.0;
 	}
-	if (!p.liquid.viscous.on()) phys.viscousShearForce = Vector3r::Zero();
+	if (!p.cohesion.liquid.viscous.on()) phys.viscousShearForce = Vector3r::Zero();
 
-	if (normal == ::dembark::NormalLaw::hooke && !(characteristicVelocity > 0.0))
+	if (options.normal_law == ::dembark::NormalLaw::hooke && !(characteristicVelocity > 0.0))
 		fail(law2 + "characteristicVelocity must be > 0 m/s for normalLaw='hooke'");
 	phys.preparedBy = current;
 }
@@ -363,10 +378,11 @@ void Law2::reportBridge(Phys& phys, const Interaction& interaction, const ::demb
 ::dembark::ContactForce Law2::act(Phys& phys, const Interaction& interaction, const ContactView& view) {
 	const Body::id_t id1 = interaction.getId1(), id2 = interaction.getId2();
 	const double     volumeBefore = phys.bridgeVolume;
-	const bool       viscous      = phys.contact.liquid.viscous.on();
+	const bool       viscous      = phys.contact.cohesion.liquid.viscous.on();
 	// In every step: engines that choose the time step lengthen it, and grains grow.
 	if (viscous) {
-		const double limit = phys.contact.liquid.stable_time_step(view.bodies.effective_radius(), view.bodies.effective_mass());
+		const double limit =
+			phys.contact.cohesion.liquid.stable_time_step(view.bodies.effective_radius(), view.bodies.effective_mass());
 		if (scene->dt > limit)
 			fail(pairName(*Body::byId(id1, scene), *Body::byId(id2, scene)) + ": their viscous bridge needs O.dt <= " +
 			     text(limit) + " s, not " + text(scene->dt) + " s, or a larger minimumGap");
@@ -380,7 +396,7 @@ void Law2::reportBridge(Phys& phys, const Interaction& interaction, const ::demb
 
 	if (!(out.overlap > 0.0) && phys.dissipatedEnergy > 0.0) endedDissipation += phys.dissipatedEnergy;
 	phys.setState(state);
-	phys.capillaryForce = out.capillary_force;
+	phys.capillaryForce = out.cohesive_force;
 	phys.viscousForce   = out.viscous_normal;
 	if (carriedLiquid) reportBridge(phys, interaction, view.bodies, out.overlap, volumeBefore);
 	if (!out.interacting) return out;
@@ -422,11 +438,13 @@ bool Law2::go(shared_ptr<IGeom>& igeom, shared_ptr<IPhys>& iphys, Interaction* i
 	if (!free1 && !free2) {  // nothing that they do to each other has an effect
 		phys.normalForce = phys.shearForce = phys.rollingTorque = Vector3r::Zero();
 		if (const double volume = phys.bridgeVolume; carriedLiquid && volume > 0.0) {
-			bridge_step(phys.contact.liquid, geom.radius1, geom.radius2, -geom.penetrationDepth, false, phys.bridgeVolume,
-			            phys.ruptureDistance);
+			::dembark::CohesionState state{volume, phys.ruptureDistance};
+			cohesion_step(phys.contact.cohesion, {geom.radius1, geom.radius2, -geom.penetrationDepth, false, 0.0}, state);
+			phys.bridgeVolume    = state.bridge_volume;
+			phys.ruptureDistance = state.rupture_distance;
 			reportBridge(phys, *interaction, view.bodies, geom.penetrationDepth, volume);
 		}
-		return geom.penetrationDepth > 0.0 || phys.bridgeVolume > 0.0;
+		return geom.penetrationDepth > 0.0 || phys.ruptureDistance > 0.0;
 	}
 
 	if (phys.wallBody && !((phys.wallBody == 1 ? geom.radius2 : geom.radius1) > geom.penetrationDepth))

@@ -18,6 +18,7 @@
 #include "SavedFormat.hpp"
 #include "attributes.hpp"
 #include "dembark/contact.hpp"
+#include "dembark/parameters/contact_parameters.hpp"
 #include "dembark/pairs/pair_step.hpp"
 
 namespace yade {
@@ -74,7 +75,7 @@ public:
 	void setBridge(double volume, double imbalance, double radius1, double radius2) {
 		bridgeVolume    = volume;
 		bridgeImbalance = imbalance;
-		ruptureDistance = contact.liquid.force->rupture_distance(radius1, radius2, volume);
+		ruptureDistance = contact.cohesion.liquid.force->rupture_distance(radius1, radius2, volume);
 	}
 
 	// clang-format off
@@ -84,9 +85,9 @@ public:
 		((std::vector<Real>,slipRings,,Attr::readonly,"State of a contact with ``presliding='partial_slip'``: displacements [m] of eight rings along an axis and across it, the axis, the radius [m] of the first ring and of the contact"))
 		((Real,dissipatedEnergy,0,,"Energy [J] lost by slip and tangential damping since the contact began"))
 		((Real,bridgeVolume,0,,"Volume [m^3] of the liquid bridge that is there; 0 = no bridge"))
-		((Real,ruptureDistance,0,,"Gap [m] beyond which that bridge breaks"))
+		((Real,ruptureDistance,0,,"Gap [m] beyond which that bridge, or the contact under 'jkr', breaks; 0 = nothing holds it"))
 		((Real,bridgeImbalance,0,,"Volume [m^3] that body 1 (the sphere, of a sphere and a wall) gets back when a bridge of carried liquid breaks, less that of the other"))
-		((Real,capillaryForce,0,Attr::readonly,"Force [N] of the bridge, positive = attractive"))
+		((Real,capillaryForce,0,Attr::readonly,"Force [N] of the bridge, or of the adhesion of dry surfaces, positive = attractive"))
 		((Real,viscousForce,0,Attr::readonly,"Force [N] along the normal by which the liquid resists, positive = repulsive"))
 		((Vector3r,viscousShearForce,Vector3r::Zero(),Attr::readonly,"Force [N] in the plane of contact by which the liquid resists; it is part of :yref:`NormShearPhys.shearForce`"))
 		((Vector3r,rollingAngle,Vector3r::Zero(),,"State of a contact with ``rollingResistance='elastic_plastic'``: angle [rad] of the rolling spring, of the sphere (of body 1, of two spheres)"))
@@ -99,15 +100,15 @@ public:
 		((Real,criticalSlipDistance,0,Attr::triggerPostLoad,"Slip [m] over which friction falls from its static to its kinetic value"))
 		((Real,interfaceShearStrength,1e30,Attr::triggerPostLoad,"Shear strength [Pa] of the interface; 1e30 or more = unlimited"))
 		((Real,healingTime,0,Attr::triggerPostLoad,"Time constant [s] in which slip is forgotten while the contact sticks; 0 = at once"))
-		((Real,rollingFriction,0,Attr::triggerPostLoad,"Coefficient of rolling resistance"))
-		((Real,rollingDampingRatio,0,Attr::triggerPostLoad,"Damping ratio of the rolling spring"))
-		((bool,rolls,false,Attr::triggerPostLoad,"A coefficient of rolling resistance is known"))
+		((Real,rollingFriction,-1,Attr::triggerPostLoad,"Coefficient of rolling resistance; -1, here and below: not given"))
+		((Real,rollingDampingRatio,-1,Attr::triggerPostLoad,"Damping ratio of the rolling spring"))
 		((Real,newBridgeVolume,0,Attr::triggerPostLoad,"Volume [m^3] of a bridge that forms when the bodies touch"))
-		((bool,wettable,false,Attr::triggerPostLoad,"Surface tension and contact angle are known"))
-		((Real,surfaceTension,0,Attr::triggerPostLoad,"Surface tension [N/m]"))
-		((Real,contactAngle,0,Attr::triggerPostLoad,"Contact angle [rad]"))
+		((Real,surfaceTension,-1,Attr::triggerPostLoad,"Surface tension [N/m]"))
+		((Real,contactAngle,-1,Attr::triggerPostLoad,"Contact angle [rad]"))
 		((Real,liquidViscosity,0,Attr::triggerPostLoad,"Viscosity [Pa s] of the liquid; 0 = no viscous force"))
-		((Real,minimumGap,0,Attr::triggerPostLoad,"Gap [m] below which viscous forces do not grow")),
+		((Real,minimumGap,-1,Attr::triggerPostLoad,"Gap [m] below which viscous forces do not grow"))
+		((Real,cohesiveForce,-1,Attr::triggerPostLoad,"Attraction [N] of touching surfaces"))
+		((Real,workOfAdhesion,-1,Attr::triggerPostLoad,"Work of adhesion [J/m^2]")),
 		createIndex();
 		, /*py*/
 		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
@@ -143,6 +144,8 @@ public:
 		((Real,surfaceTension,NaN,,"Surface tension [N/m], >= 0. Required with a bridge volume, and with carried liquid."))
 		((Real,liquidViscosity,0,,"Viscosity [Pa s] of the liquid, >= 0; 0 = no viscous force."))
 		((Real,minimumGap,0,,"Gap [m], > 0, below which viscous forces do not grow: the roughness of the surfaces. Required with a viscosity."))
+		((shared_ptr<MatchMaker>,cohesiveForce,,,"Attraction [N] of touching surfaces, >= 0. Required with the cohesion 'constant'."))
+		((shared_ptr<MatchMaker>,workOfAdhesion,,,"Work of adhesion [J/m^2], >= 0, twice the surface energy of equal materials. Required with the cohesion 'dmt' or 'jkr'."))
 		((Real,healingTime,0,,"Time constant [s] in which slip is forgotten while a contact sticks; 0 = at once."))
 		, /*ctor*/
 		, /*py*/
@@ -177,6 +180,7 @@ public:
 		((string,presliding,"linear",Attr::triggerPostLoad,"Tangential force before gross slip: 'linear', 'exponential' or 'partial_slip'"))
 		((string,frictionLimit,"total",Attr::triggerPostLoad,"Normal force that limits friction: 'total', with its damping, or 'elastic', of its spring alone"))
 		((string,rollingResistance,"off",Attr::triggerPostLoad,"Couple against rolling: 'off', 'constant_torque' or 'elastic_plastic'"))
+		((string,cohesion,"none",Attr::triggerPostLoad,"Attraction: 'none', 'bridge' (given, too, by a capillaryModel), or of dry surfaces 'constant', 'dmt' or 'jkr'"))
 		((string,capillaryModel,"none",Attr::triggerPostLoad,"'none', or the force law of a bridge: 'exact', 'willett', 'willett_full', 'rabinovich', 'bagheri', 'constant'"))
 		((bool,carriedLiquid,false,Attr::triggerPostLoad,"Bridges take their liquid from the bodies and give it back; needs the engine :yref:`CapillaryLiquid` after the :yref:`InteractionLoop`"))
 		((bool,tangentialDamping,true,Attr::triggerPostLoad,"Viscous tangential force while a contact sticks"))
@@ -200,21 +204,15 @@ private:
 	::dembark::ContactForce act(FinnieRabinowiczPhys&, const Interaction&, const dembark_yade::ContactView& view);
 	void reportBridge(FinnieRabinowiczPhys&, const Interaction&, const ::dembark::ContactBodies&, double overlap, double volumeBefore);
 
-	::dembark::NormalLaw        normal  = ::dembark::NormalLaw::hertz;
-	::dembark::Presliding       path    = ::dembark::Presliding::linear;
-	::dembark::FrictionLimit    load    = ::dembark::FrictionLimit::total;
-	::dembark::RollingModel     rolling = ::dembark::RollingModel::off;
-	bool                        wet     = false;
-	::dembark::capillary::Model model   = ::dembark::capillary::Model::exact;
-	bool                        damped = true, limited = false;
-	std::atomic<double>         revision{-1.0};
-	std::atomic<bool>           warned{false};
-	std::atomic<long>           checked{-1};  // last step of checkScene()
-	dembark_yade::LawKinds      kinds;        // of this revision
+	::dembark::ContactOptions options;
+	std::atomic<double>       revision{-1.0};
+	std::atomic<bool>         warned{false};
+	std::atomic<long>         checked{-1};  // last step of checkScene()
+	dembark_yade::LawKinds    kinds;        // of this revision
 };
 REGISTER_SERIALIZABLE(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz);
 
 }  // namespace yade
 
-DEMBARK_SAVED_FORMAT(FinnieRabinowiczPhys, 1)
-DEMBARK_SAVED_FORMAT(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz, 1)
+DEMBARK_SAVED_FORMAT(FinnieRabinowiczPhys, 2)
+DEMBARK_SAVED_FORMAT(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz, 2)

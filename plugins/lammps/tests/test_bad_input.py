@@ -34,8 +34,8 @@ def test_the_deck_runs_as_it_is(tmp_path, deck):
 
 @pytest.mark.parametrize(("old", "new", "words"), [
     ("normal hertz", "normal linear", ("pair_style dembark/granular", "normal 'linear'", "hertz or hooke")),
-    ("normal hertz", "normal hooke -1", ("characteristic velocity > 0",)),
-    ("normal hertz", "normals hertz", ("'normals' is unknown", "presliding, friction_limit, rolling_resistance, capillary_model")),
+    ("normal hertz", "normal hooke -1", ("characteristic_velocity (m/s) must be > 0",)),
+    ("normal hertz", "normals hertz", ("'normals' is unknown", "presliding, friction_limit, rolling_resistance, cohesion")),
     ("presliding linear", "presliding bent", ("presliding 'bent'", "linear, exponential or partial_slip")),
     ("presliding linear", "friction_limit viscous", ("friction_limit 'viscous'", "total or elastic")),
     ("healing_time 0.0", "healing_time soon", ("healing_time needs a number, not 'soon'",)),
@@ -52,9 +52,9 @@ def test_the_deck_runs_as_it_is(tmp_path, deck):
     ("youngs_modulus 10000000.0", "youngs_modulus -1", ("youngs_modulus (Pa) must be > 0",)),
     ("poissons_ratio 0.3", "poissons_ratio 0.6", ("poissons_ratio must be > -1 and <= 0.5",)),
     ("kinetic_friction 0.3", "kinetic_friction 0.9", ("kinetic friction must not exceed static friction", "types 1-1")),
-    ("critical_slip_distance 1e-05", "critical_slip_distance -1", ("critical slip distance (m) must be >= 0",)),
+    ("critical_slip_distance 1e-05", "critical_slip_distance -1", ("critical_slip_distance (m) must be >= 0",)),
     ("bridge_volume 2e-10", "bridge_volume -1", ("bridge_volume (m^3) must be >= 0",)),
-    ("contact_angle 0.35", "contact_angle 20", ("contact_angle is in radians",)),
+    ("contact_angle 0.35", "contact_angle 20", ("contact_angle (rad) must be >= 0 and <= 1.5708, not 20",)),
     ("pair_coeff * *", "pair_coeff 1 1", ("All pair coeffs are not set",)),
     ("pair_coeff * *", "pair_coeff 1 2", ("youngs_modulus belongs to one type", "pair_coeff 1 1")),
     ("comm_modify vel yes", "", ("comm_modify vel yes",)),

@@ -31,15 +31,6 @@ struct ViscousLiquid {
   double minimum_gap = 0.0;  ///< m, > 0 with a viscosity: the gap is never taken smaller
 
   DEMBARK_FUNCTION bool on() const { return viscosity > 0.0; }
-
-  /// What is wrong, or null. Engines put the names of their own parameters before it.
-  const char* error() const {
-    if (!(viscosity >= 0.0 && std::isfinite(viscosity))) return "the viscosity (Pa s) must be >= 0 and finite";
-    if (viscosity > 0.0 && !(minimum_gap > 0.0 && std::isfinite(minimum_gap)))
-      return "the minimum gap (m) must be > 0 and finite with a viscosity: viscous forces diverge as the gap closes; the roughness of the "
-             "surfaces is usual";
-    return nullptr;
-  }
 };
 
 /// Force per velocity (N s/m), >= 0; the force is this times the velocity, against it.

@@ -203,7 +203,7 @@ struct ShadowImpact {
 
   /// Begins with bodies that overlap for the first time, less than `step` (s) after their touch. False where there is nothing to compare.
   bool begin(const ContactParameters& p, ContactBodies b, long first, long second, double step) {
-    if (std::isinf(b.mass_1) || std::isinf(b.mass_2) || p.liquid.force) return false;
+    if (std::isinf(b.mass_1) || std::isinf(b.mass_2) || p.cohesion.on()) return false;
     elapsed = back_to_touch(b, step);
     if (elapsed < 0.0) return false;
     const ReferenceImpact reference(p, b);

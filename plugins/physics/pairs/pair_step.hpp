@@ -52,7 +52,7 @@ struct ContactCallbacks {
   virtual Vec3<double> friction(const PairBlock& block, int k, const Vec3<double>& normal, double twist,
                                 const NormalResponse<double>& response, const Vec3<double>& velocity) = 0;
   /// Forces (N, > 0: pulls) of the bridges of `count` pairs over their gaps (m).
-  virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* capillary_force) = 0;
+  virtual void bridges(const PairBlock& block, int first, int count, const double* gap, double* cohesive_force) = 0;
 };
 
 /// The same of contacts that remember more: the rings of partial slip, a rolling spring.

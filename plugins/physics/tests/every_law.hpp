@@ -27,7 +27,7 @@ DEMBARK_FUNCTION inline ContactBodies bodies_on_path(int step, bool wall, bool u
 /// Adds forces, torques, energies and works of 80 steps of one contact to the results.
 DEMBARK_FUNCTION inline void follow_path(const ContactParameters& p, bool wall, bool unequal, double* results) {
   HistoryLayout layout;
-  layout.bridge = layout.rings = layout.rolling = true;
+  layout.cohesion = layout.rings = layout.rolling = true;
   double row[128] = {}, swapped[128];
   for (int step = 0; step < 80; ++step) {
     const ContactBodies b = bodies_on_path(step, wall, unequal);
@@ -88,14 +88,26 @@ DEMBARK_FUNCTION inline void each_law(const capillary::BridgeForce* bridges, Vis
       p.elasticity.effective_youngs_modulus = 5e7;
       p.elasticity.effective_shear_modulus = 2e7;
       p.elasticity.damping = -0.2;
-      p.liquid.force = bridges + model;
-      p.liquid.surface_tension = 0.07;
-      p.liquid.bridge_volume = kind == 3 ? 1e-19 : 1e-12;
-      if (kind & 1) p.liquid.viscous.viscosity = 1e-3, p.liquid.viscous.minimum_gap = 1e-6;
+      Liquid& liquid = p.cohesion.liquid;
+      p.cohesion.law = CohesionLaw::bridge;
+      liquid.force = bridges + model;
+      liquid.surface_tension = 0.07;
+      liquid.bridge_volume = kind == 3 ? 1e-19 : 1e-12;
+      if (kind & 1) liquid.viscous.viscosity = 1e-3, liquid.viscous.minimum_gap = 1e-6;
       visit(p, kind == 1, kind == 2);
     }
+  for (const CohesionLaw law : {CohesionLaw::constant, CohesionLaw::dmt, CohesionLaw::jkr}) {
+    ContactParameters p;
+    p.elasticity.effective_youngs_modulus = 5e7;
+    p.elasticity.effective_shear_modulus = 2e7;
+    p.elasticity.damping = -0.2;
+    p.cohesion.law = law;
+    p.cohesion.cohesive_force = 1e-4;
+    p.cohesion.work_of_adhesion = 0.05;
+    visit(p, law == CohesionLaw::dmt, law == CohesionLaw::jkr);
+  }
 }
-constexpr int law_count = 2 * 3 * 8 + bridge_models * 4;
+constexpr int law_count = 2 * 3 * 8 + bridge_models * 4 + 3;
 
 /// `bridges`: one of each model, in their order; `results`: law_count rows of results_of_path numbers, which begin as zeros.
 DEMBARK_FUNCTION inline void follow_every_law(const capillary::BridgeForce* bridges, double* results) {

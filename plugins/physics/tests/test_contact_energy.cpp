@@ -70,7 +70,7 @@ Account impact(const ContactParameters& p, double dt) {
     const auto work = [&](ContactPart part) { return dot(parts[part], velocity) * dt; };
     const double normal = work(ContactPart::normal_elastic), tangential = work(ContactPart::tangential_elastic);
     const double viscous = work(ContactPart::normal_viscous) + work(ContactPart::tangential_viscous);
-    const double capillary = work(ContactPart::capillary), liquid = work(ContactPart::liquid_viscous);
+    const double capillary = work(ContactPart::cohesive), liquid = work(ContactPart::liquid_viscous);
     const Vec3<double> spin = mean.relative_spin();
     const double rolling = dot(parts[ContactPart::rolling_elastic], spin) * dt, lost = dot(parts[ContactPart::rolling_viscous], spin) * dt;
     out.rolling += rolling;
@@ -95,7 +95,7 @@ ContactParameters parameters(double restitution, double friction, bool wet, doub
   ContactParameters p;
   p.elasticity = {effective_youngs_modulus(5e6, 0.3, 5e6, 0.3), effective_shear_modulus(5e6, 0.3, 5e6, 0.3), restitution};
   p.friction.static_friction = p.friction.kinetic_friction = friction;
-  if (wet) p.liquid = {&bridge, 0.072, 1e-11, {viscosity, 1e-5}};
+  if (wet) p.cohesion = {CohesionLaw::bridge, {&bridge, 0.072, 1e-11, {viscosity, 1e-5}}};
   return p;
 }
 
@@ -213,7 +213,7 @@ TEST_CASE("held bodies: springs without damping, finite forces and parts, whatev
                 CHECK(std::isfinite(norm(state.friction.displacement) + state.friction.slip + norm(state.rolling_angle)));
                 for (const Vec3<double>& load : parts.load) CHECK(std::isfinite(norm(load)));
                 CHECK(std::abs(parts.normal_stored - 0.4 * spring * 1e-5) < 1e-12 * spring);
-                CHECK(p.liquid.stable_time_step(b.effective_radius(), b.effective_mass()) == INFINITY);
+                CHECK(p.cohesion.liquid.stable_time_step(b.effective_radius(), b.effective_mass()) == INFINITY);
               }
             }
 }

@@ -86,9 +86,9 @@ TEST_CASE("a bridge pulls the surfaces together and takes nothing from what limi
   static const capillary::BridgeLaw bridge(capillary::Model::willett, 0.3);
   for (const FrictionLimit limit : {FrictionLimit::total, FrictionLimit::elastic}) {
     ContactParameters wet = parameters(limit), dry = wet;
-    wet.liquid = {&bridge, 0.072, 1e-11, {}};
+    wet.cohesion = {CohesionLaw::bridge, {&bridge, 0.072, 1e-11, {}}};
     const ContactForce of_wet = slides(wet, 2e-5, 0.1), of_dry = slides(dry, 2e-5, 0.1);
-    CHECK(of_wet.capillary_force > 0.0);
+    CHECK(of_wet.cohesive_force > 0.0);
     CHECK(of_wet.tangential.x == of_dry.tangential.x);
   }
 }

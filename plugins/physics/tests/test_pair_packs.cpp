@@ -60,8 +60,11 @@ struct Scene : ContactCallbacks, HistoryCallbacks {
   void bridges(const PairBlock& block, int first, int number, const double* gap, double* pull) override {
     for (int n = 0; n < number; ++n) {
       const int k = first + n;
-      double* const row = block.history[k] + layout.bridge_at();
-      pull[n] = bridge_step(law.liquid, radius[block.grain[k]], radius[block.partner[k]], gap[n], block.pick[k] & 1, row[0], row[1]);
+      double* const row = block.history[k] + layout.cohesion_at();
+      pull[n] = cohesion_step(
+          law.cohesion,
+          {radius[block.grain[k]], radius[block.partner[k]], gap[n], (block.pick[k] & 1) != 0, law.elasticity.effective_youngs_modulus},
+          row);
       if (row[0] > 0.0) *block.flags[k] = 1;
     }
   }
@@ -120,7 +123,7 @@ struct Scene : ContactCallbacks, HistoryCallbacks {
     s.more = layout.rings || layout.rolling ? layout.rings_at() : -1;
     s.more_numbers = layout.imbalance_at() - layout.rings_at();
     s.dt = dt;
-    s.wet = layout.bridge;
+    s.wet = layout.cohesion;
     s.limit_force = law.limit_force;
     s.tangential_damping = law.tangential_damping;
     s.elastic_limit = law.friction.friction_limit == FrictionLimit::elastic;
@@ -181,7 +184,7 @@ int compare(Scene& s, const PairLoops& loops) {
         const ContactState now = s.state(i, k), &expected = states[std::size_t(i)][std::size_t(k)];
         CHECK(norm(now.friction.displacement - expected.friction.displacement) <= 1e-16 + 1e-9 * norm(expected.friction.displacement));
         CHECK(std::abs(now.friction.slip - expected.friction.slip) <= 1e-16 + 1e-9 * expected.friction.slip);
-        CHECK(std::abs(now.bridge_volume - expected.bridge_volume) <= 1e-12 * expected.bridge_volume);
+        CHECK(std::abs(now.cohesion.bridge_volume - expected.cohesion.bridge_volume) <= 1e-12 * expected.cohesion.bridge_volume);
         CHECK(norm(now.rolling_angle - expected.rolling_angle) <= 1e-14 + 1e-9 * norm(expected.rolling_angle));
       }
     }
@@ -219,8 +222,8 @@ Scene random_scene(std::mt19937& random, int count) {
   s.law.limit_force = random() % 2;
   s.law.tangential_damping = random() % 2;
   if (random() % 2) s.law.rolling = {random() % 2 ? RollingModel::constant_torque : RollingModel::elastic_plastic, 0.1, 0.3};
-  if (random() % 2) s.law.liquid = {&bridge, 0.072, 1e-11, {}};
-  s.layout.bridge = s.law.liquid.force != nullptr;
+  if (random() % 2) s.law.cohesion = {CohesionLaw::bridge, {&bridge, 0.072, 1e-11, {}}};
+  s.layout.cohesion = s.law.cohesion.holds();
   s.layout.rings = s.law.friction.presliding == Presliding::partial_slip;
   s.layout.rolling = s.law.rolling.on();
   for (int i = 0; i < count; ++i) {

@@ -207,11 +207,3 @@ TEST_CASE("the spin of a triangle is that of the rigid body that it belongs to",
   const Vec3<double> spin{1.0, -2.0, 3.0}, first{1.0, 0.2, 0.3}, second{-0.4, 0.8, 0.1};
   CHECK_THAT(norm(triangle_spin(first, second, cross(spin, first), cross(spin, second)) - spin), WithinAbs(0.0, 1e-14));
 }
-
-TEST_CASE("one line for parameters that cannot be", "[rolling]") {
-  CHECK(law(RollingModel::off, 0.1).error() == nullptr);
-  for (const double wrong : {-0.1, double(NAN), double(INFINITY)}) {
-    CHECK(law(RollingModel::off, wrong).error() != nullptr);
-    CHECK(law(RollingModel::elastic_plastic, 0.1, wrong).error() != nullptr);
-  }
-}

@@ -88,16 +88,6 @@ TEST_CASE("works on other scalars", "[viscous]") {
                WithinRel(static_cast<float>(viscous_resistance(oil, R, 1e-5, volume).normal), 1e-5f));
 }
 
-TEST_CASE("what is wrong with a viscous liquid is said", "[viscous]") {
-  REQUIRE(oil.error() == nullptr);
-  REQUIRE(ViscousLiquid{}.error() == nullptr);
-  const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
-  for (const double bad : {-1.0, nan, infinite})
-    REQUIRE(std::string(ViscousLiquid{bad, 1e-6}.error()).find("viscosity") != std::string::npos);
-  for (const double bad : {0.0, -1e-6, nan, infinite})
-    REQUIRE(std::string(ViscousLiquid{1e-3, bad}.error()).find("minimum gap") != std::string::npos);
-}
-
 TEST_CASE("the time step limit is that of the normal force at the floor", "[viscous]") {
   const double mass = 3e-5;
   REQUIRE_THAT(viscous_time_step(oil, R, mass) * viscous_resistance(oil, R, 0.0, 1e6).normal, WithinRel(mass, 1e-6));
@@ -107,7 +97,7 @@ TEST_CASE("the liquid takes energy from any motion, and no angular momentum", "[
   const BridgeLaw bridge(Model::constant, 0.3);
   ContactParameters p;
   p.elasticity = {1e7, 4e6, 0.8};
-  p.liquid = {&bridge, 0.0, volume, oil};
+  p.cohesion = {CohesionLaw::bridge, {&bridge, 0.0, volume, oil}};
   std::mt19937 chance(7);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   const auto vector = [&](double scale) { return Vec3<double>{scale * any(chance), scale * any(chance), scale * any(chance)}; };
@@ -118,8 +108,8 @@ TEST_CASE("the liquid takes energy from any motion, and no angular momentum", "[
     b.angular_velocity_1 = vector(50.0);
     b.angular_velocity_2 = vector(50.0);
     ContactState state;
-    state.bridge_volume = volume;
-    state.rupture_distance = 1.0;
+    state.cohesion.bridge_volume = volume;
+    state.cohesion.rupture_distance = 1.0;
     const ContactForce f = contact_step(p, b, 1e-7, state);
     const double power =
         dot(f.force, b.velocity_1 - b.velocity_2) + dot(f.torque_1, b.angular_velocity_1) + dot(f.torque_2, b.angular_velocity_2);
@@ -139,8 +129,8 @@ TEST_CASE("the liquid takes energy from any motion, and no angular momentum", "[
     std::swap(other.mass_1, other.mass_2);
     other.separation = -b.separation;
     state = {};
-    state.bridge_volume = volume;
-    state.rupture_distance = 1.0;
+    state.cohesion.bridge_volume = volume;
+    state.cohesion.rupture_distance = 1.0;
     const ContactForce g = contact_step(p, other, 1e-7, state);
     REQUIRE_THAT(norm(g.force + f.force), WithinAbs(0.0, 1e-12 * norm(f.force)));
     REQUIRE_THAT(norm(g.torque_1 - f.torque_2), WithinAbs(0.0, 1e-12 * norm(f.torque_2)));
@@ -151,7 +141,7 @@ TEST_CASE("there is no viscous force without a bridge", "[viscous]") {
   const BridgeLaw bridge(Model::constant, 0.3);
   ContactParameters p;
   p.elasticity = {1e7, 4e6, 0.8};
-  p.liquid = {&bridge, 0.07, volume, oil};
+  p.cohesion = {CohesionLaw::bridge, {&bridge, 0.07, volume, oil}};
   ContactBodies b = pair(1e-6);
   b.velocity_1 = {0.2, 0.0, -0.3};
   ContactState state;
@@ -160,7 +150,7 @@ TEST_CASE("there is no viscous force without a bridge", "[viscous]") {
   const ContactForce touching = contact_step(p, b, 1e-7, state);
   const double floor = viscous_resistance(oil, 2.0 * reduced(2e-3, 1.5e-3), 0.0, volume).normal;
   REQUIRE_THAT(touching.viscous_normal, WithinRel(0.3 * floor, 1e-12));
-  b.separation.z += state.rupture_distance + 2e-6;
+  b.separation.z += state.cohesion.rupture_distance + 2e-6;
   b.velocity_1.z = 0.3;
   const ContactForce apart = contact_step(p, b, 1e-7, state);
   REQUIRE((norm(apart.force) == 0.0 && norm(apart.torque_1) == 0.0 && !apart.interacting));

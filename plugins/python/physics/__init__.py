@@ -3,6 +3,7 @@
 All quantities are in SI units.
 """
 
+from dembark.physics.adhesion import dmt_pull_off, jkr_force, jkr_loss, jkr_pull_off, jkr_rupture_distance
 from dembark.physics.capillary import CAPILLARY_MODELS, capillary_force, rupture_distance
 from dembark.physics.contact import Body, Contact, ContactForce, RollingResistance, Trajectory, collide, drop
 from dembark.physics.friction import FinnieRabinowicz, FrictionPath
@@ -49,10 +50,15 @@ __all__ = [
     "WallMotion",
     "capillary_force",
     "collide",
+    "dmt_pull_off",
     "drop",
     "effective_shear_modulus",
     "effective_youngs_modulus",
     "integrate_adams",
+    "jkr_force",
+    "jkr_loss",
+    "jkr_pull_off",
+    "jkr_rupture_distance",
     "liquid_bridge",
     "liquid_grant",
     "liquid_share",

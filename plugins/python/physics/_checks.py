@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from dembark import _physics
+
+# The numbers of a contact by name, as all engines check them.
+CONTACT_PARAMETERS: dict[str, dict[str, Any]] = {str(row["name"]): row for row in _physics.contact_parameters()}
 
 
 class Limits(TypedDict, total=False):
@@ -33,4 +38,17 @@ def numbers(name: str, value: ArrayLike, unit: str, *, low: float = -np.inf, hig
             raise ValueError(f"{name} must be a {'' if infinite else 'finite '}number ({unit}), not {first:g}")
         bound = f"> {low:g}" if low_open else f">= {low:g}" if high == np.inf else f"between {low:g} and {high:g}"
         raise ValueError(f"{name} must be {bound} {unit}{'' if infinite else ' and finite'}, not {first:g}")
+    return array
+
+
+def contact_number(name: str, value: ArrayLike, label: str = "") -> NDArray[np.float64]:
+    """`value` of the contact parameter `name` as float64; ValueError, under the name `label` if given, for one out of range."""
+    row, label = CONTACT_PARAMETERS[name], label or name
+    array = numbers(label, value, row["unit"], infinite=True)
+    bad = (array <= row["low"] if row["low_open"] else array < row["low"]) | (array > row["high"])
+    if not row["infinite"]:
+        bad |= np.isinf(array)
+    if bad.any():
+        unit = "" if row["unit"] == "1" else f" ({row['unit']})"
+        raise ValueError(f"{label}{unit} must be {row['range']}, not {array[bad].flat[0]:g}")
     return array

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark import _physics
-from dembark.physics._checks import numbers
+from dembark.physics._checks import contact_number, numbers
 from dembark.physics.capillary import check_model
 from dembark.physics.friction import FinnieRabinowicz
 from dembark.physics.viscous import check_viscous
@@ -38,7 +38,7 @@ class ContactForce:
     torque_2: Vector
     overlap: float  # negative = gap
     normal_force: float  # repulsive, of the normal law alone
-    capillary_force: float  # attractive
+    capillary_force: float  # attractive, of a bridge or of adhesion
     tangential: Vector  # friction
     viscous_normal: float  # of the liquid, along the normal from body 2 to body 1
     viscous_tangential: Vector  # of the liquid
@@ -66,8 +66,8 @@ class RollingResistance:
     _law: _physics.RollingResistance = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name in ("friction", "damping_ratio"):
-            numbers(name, getattr(self, name), "")
+        contact_number("rolling_friction", self.friction, "friction")
+        contact_number("rolling_damping_ratio", self.damping_ratio, "damping_ratio")
         object.__setattr__(self, "_law", _physics.RollingResistance(self.model, float(self.friction), float(self.damping_ratio)))
 
 
@@ -79,6 +79,8 @@ class Contact:
     restitution : 0 < e <= 1
     friction : the tangential law
     normal_law : 'hertz' or 'hooke' (with characteristic_velocity, m/s)
+    cohesion : 'none', 'bridge', 'constant' (cohesive_force, N), 'dmt' or 'jkr' (work_of_adhesion, J/m^2), see `dembark.physics.adhesion`;
+        default: 'bridge' with a bridge_volume, else 'none'
     bridge_volume : m^3 of each bridge, 0 = dry; with surface_tension (N/m), contact_angle (rad) and capillary_model
     viscosity : Pa s of the liquid, 0 = no viscous force; with minimum_gap (m, > 0), see `viscous_resistance`
     rolling : rolling resistance
@@ -92,6 +94,9 @@ class Contact:
     characteristic_velocity: float = 1.0
     tangential_damping: bool = True
     limit_force: bool = False
+    cohesion: str = ""
+    cohesive_force: float = 0.0
+    work_of_adhesion: float = 0.0
     bridge_volume: float = 0.0
     surface_tension: float = 0.0
     contact_angle: float = 0.0
@@ -101,16 +106,19 @@ class Contact:
     rolling: RollingResistance = field(default_factory=RollingResistance)
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.restitution <= 1.0:
-            raise ValueError(f"restitution must be > 0 and <= 1, not {self.restitution:g}")
-        if not (0.0 < self.effective_youngs_modulus < np.inf and 0.0 < self.effective_shear_modulus < np.inf):
-            raise ValueError("effective elastic moduli must be > 0 Pa and finite")
+        for name in ("restitution", "characteristic_velocity", "bridge_volume", "surface_tension", "contact_angle", "cohesive_force",
+                     "work_of_adhesion"):
+            contact_number(name, getattr(self, name))
+        for name in ("effective_youngs_modulus", "effective_shear_modulus"):
+            contact_number("youngs_modulus", getattr(self, name), name)
         if self.normal_law not in ("hertz", "hooke"):
             raise ValueError(f"normal_law must be 'hertz' or 'hooke', not {self.normal_law!r}")
-        numbers("characteristic_velocity", self.characteristic_velocity, "m/s", low=0.0, low_open=True)
-        numbers("bridge_volume", self.bridge_volume, "m^3", low=0.0)
-        numbers("surface_tension", self.surface_tension, "N/m", low=0.0)
-        numbers("contact_angle", self.contact_angle, "rad", low=0.0, high=np.pi / 2)
+        if self.cohesion and self.cohesion not in _physics.cohesion_laws():
+            raise ValueError(f"cohesion {self.cohesion!r} is unknown; it can be {', '.join(_physics.cohesion_laws())}")
+        if self.cohesion == "jkr" and self.normal_law != "hertz":
+            raise ValueError("the cohesion 'jkr' needs the normal law 'hertz'")
+        if self.bridge_volume > 0.0 and self.cohesion not in ("", "bridge"):
+            raise ValueError(f"bridge_volume is for the cohesion 'bridge', not for {self.cohesion!r}")
         check_model(self.capillary_model)
         check_viscous(self.viscosity, self.minimum_gap)
 
@@ -118,8 +126,9 @@ class Contact:
         """State of a contact that has not touched yet."""
         return _physics.Contact(self.normal_law, self.effective_youngs_modulus, self.effective_shear_modulus, self.restitution,
                                 self.characteristic_velocity, self.tangential_damping, self.limit_force, self.friction._law,
-                                self.capillary_model, self.contact_angle, self.surface_tension, self.bridge_volume, self.viscosity,
-                                self.minimum_gap, self.rolling._law)
+                                self.rolling._law, self.cohesion or ("bridge" if self.bridge_volume > 0.0 else "none"),
+                                self.cohesive_force, self.work_of_adhesion, self.capillary_model, self.contact_angle,
+                                self.surface_tension, self.bridge_volume, self.viscosity, self.minimum_gap)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import Limits, numbers
+from dembark.physics._checks import Limits, contact_number, numbers
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class FinnieRabinowicz:
 
     def __post_init__(self) -> None:
         for name in ("static_friction", "kinetic_friction", "critical_slip_distance", "interface_shear_strength", "healing_time"):
-            numbers(name, getattr(self, name), "", infinite=name == "interface_shear_strength")
+            contact_number(name, getattr(self, name))
         object.__setattr__(self, "_law", _physics.FinnieRabinowicz(
             float(self.static_friction), float(self.kinetic_friction), float(self.critical_slip_distance),
             float(self.interface_shear_strength), float(self.healing_time), self.presliding,

@@ -124,7 +124,7 @@ def test_bridge_holds_a_grain_and_needs_energy_to_part():
 @pytest.mark.parametrize(("change", "words"), [
     ({"restitution": 0.0}, "restitution must be > 0 and <= 1"), ({"restitution": 1.1}, "restitution"),
     ({"restitution": np.nan}, "restitution"),
-    ({"effective_youngs_modulus": 0.0}, "moduli must be > 0 Pa"), ({"normal_law": "stiff"}, "'hertz' or 'hooke'"),
+    ({"effective_youngs_modulus": 0.0}, "youngs_modulus .Pa. must be > 0"), ({"normal_law": "stiff"}, "'hertz' or 'hooke'"),
     ({"bridge_volume": -1e-12}, "bridge_volume"), ({"bridge_volume": 1e-12, "surface_tension": -1.0}, "surface_tension"),
     ({"bridge_volume": 1e-12, "contact_angle": 2.0}, "contact.angle"), ({"bridge_volume": 1e-12, "capillary_model": "magic"}, "magic"),
     ({"normal_law": "hooke", "characteristic_velocity": 0.0}, "characteristic_velocity"),

@@ -211,11 +211,11 @@ def test_a_long_path_needs_memory_for_its_points_alone():
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    ({"static_friction": -0.1}, "static friction must be a number >= 0"),
+    ({"static_friction": -0.1}, "static_friction must be >= 0"),
     ({"kinetic_friction": 0.6}, "kinetic friction must not exceed static friction"),
-    ({"critical_slip_distance": -1e-6}, "critical slip distance"),
-    ({"interface_shear_strength": 0.0}, "interface shear strength"),
-    ({"healing_time": -1.0}, "healing time"),
+    ({"critical_slip_distance": -1e-6}, "critical_slip_distance"),
+    ({"interface_shear_strength": 0.0}, "interface_shear_strength"),
+    ({"healing_time": -1.0}, "healing_time"),
     ({"healing_time": np.nan}, "healing_time"),
     ({"static_friction": np.inf}, "static_friction"),
     ({"friction_limit": "viscous"}, "'total' or 'elastic'"),
