@@ -34,7 +34,7 @@ def test_ranks_agree(run, tmp_path):
     assert two.impacts() == pytest.approx(one.impacts(), rel=1e-8)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_a_restart_goes_on_bit_for_bit(run, tmp_path, ranks):
     """Restart files in the middle of impacts: positions, forces, totals and the file of impacts are those of the run that went through."""
     through = run(tmp_path / "through", pile(steps=3000, every=500), ranks=ranks)

@@ -80,6 +80,7 @@ def assert_same_on_two_ranks(one: Found, two: Found, scene: Scene) -> None:
             assert np.abs(a[:, 1:4] - b[:, 1:4]).max() < 1e-7, scene
 
 
+@pytest.mark.full
 @RANDOM
 @given(scene=scenes())
 def test_lammps(lammps_is_there: None, scene: Scene) -> None:

@@ -139,7 +139,8 @@ run 7500"""
 WET = (OWN[0], OWN[1] + " bridge_volume 5e-12 contact_angle 0.3")
 
 
-@pytest.mark.parametrize(("style", "options", "ranks"), [(OWN, "", 1), (WET, "capillary_model exact surface_tension 0.072", 2)],
+@pytest.mark.parametrize(("style", "options", "ranks"), [(OWN, "", 1), pytest.param(WET, "capillary_model exact surface_tension 0.072", 2,
+                                                                                marks=pytest.mark.full)],
                          ids=["dry", "wet, two ranks"])
 def test_an_empty_box_is_filled(tmp_path, style, options, ranks):
     """Grains of two sizes, and a large one later, all fall on others and on the floor: none sinks in."""
@@ -175,7 +176,7 @@ dump_modify grains sort id format float %.17g
 run 1500"""
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_grains_that_grow_find_each_other_and_the_wall(tmp_path, ranks):
     """They do not move before they touch, so that LAMMPS by itself would not make new lists; as with lists of every step."""
     found = {}

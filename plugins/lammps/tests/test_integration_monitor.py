@@ -120,7 +120,7 @@ def test_two_ranks_see_what_one_sees(tmp_path: Path) -> None:
     np.testing.assert_allclose(one, two, rtol=1e-6, atol=1e-12)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_a_resumed_run_has_the_same_figures_to_the_bit(tmp_path: Path, ranks: int) -> None:
     words, state = "speed 1 impacts 1 every 5", "fix state all resume/exact 709 bed cut grains.dump\n"
 

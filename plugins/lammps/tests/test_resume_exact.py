@@ -43,7 +43,7 @@ def refused(folder, text, told, ranks=1):
 
 
 @pytest.mark.parametrize(("material", "newton"), [(WET, "off"), (DRY, "on")], ids=["wet, all histories", "dry, newton on"])
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_resumed_run_is_the_same_to_the_bit(tmp_path, material, newton, ranks):
     """States every 200 steps, frames every 500: state 400 is resumed where frame 500 and some rows were written already."""
     whole, broken = tmp_path / "whole", tmp_path / "broken"
@@ -131,7 +131,7 @@ def test_what_does_not_fit_is_refused(tmp_path):
     assert "exactly" not in run(tmp_path, text, ranks=2)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_run_that_begins_anew_deletes_no_state(tmp_path, ranks):
     text = deck("run 450", ranks=ranks, states=STATES.format(every=200))
     run(tmp_path, text, ranks)

@@ -124,7 +124,7 @@ def test_ranks_settle_alike(by_ranks, ranks):
     np.testing.assert_allclose(other[1][-1][:, 7], one[1][-1][:, 7], rtol=1e-6, atol=1e-16)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_resumed_run_is_the_same_to_the_bit(tmp_path, ranks):
     state = "fix state all resume/exact 600 bed cut grains.dump\n"
     whole, broken = tmp_path / "whole", tmp_path / "broken"
@@ -136,7 +136,7 @@ def test_resumed_run_is_the_same_to_the_bit(tmp_path, ranks):
     assert resumed[-1].tolist() == rows[-1].tolist()
 
 
-@pytest.mark.parametrize(("ranks", "others"), [(1, 2), (2, 1)])
+@pytest.mark.parametrize(("ranks", "others"), [(1, 2), pytest.param(2, 1, marks=pytest.mark.full)])
 def test_restart_on_other_ranks_conserves(tmp_path, ranks, others):
     before = run_shaken(tmp_path, shaken("run 1000\nwrite_restart bed.restart", ranks=ranks), ranks=ranks)
     after = run_shaken(tmp_path, shaken("run 500", ranks=others, create="read_restart bed.restart", state=""), ranks=others)
@@ -145,7 +145,7 @@ def test_restart_on_other_ranks_conserves(tmp_path, ranks, others):
     assert column(after, "count")[-1] > 0
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_grains_that_leave_take_their_liquid_with_them(tmp_path, ranks):
     """Two grains are shot through the open top, one of them through the heap."""
     rows = run_shaken(tmp_path, shaken("set atom 125 vz 8.0\nset atom 63 vz 30.0\nrun 2000", ranks=ranks), ranks=ranks)
@@ -155,7 +155,7 @@ def test_grains_that_leave_take_their_liquid_with_them(tmp_path, ranks):
     np.testing.assert_allclose(held + lost, held[0], rtol=1e-14)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_deleted_grains_and_walls(tmp_path, ranks):
     """A group is deleted in mid-heap, and a wet wall goes; what was in their bridges falls back to those that stay."""
     commands = """\

@@ -82,7 +82,7 @@ fix more all insert/pack seed 49979687 distributiontemplate kinds vel constant 0
     np.testing.assert_allclose(account.kinetic, account.full, rtol=1e-14)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_deleted_grains(tmp_path, ranks):
     """Their kinetic energy is imposed; what their springs held is no error of the step."""
     text = bed("run 1200\ngroup some id 1:20\ndelete_atoms group some compress no\nrun 600", ranks=ranks)
@@ -140,7 +140,7 @@ def test_linear_spring_and_limited_force(tmp_path):
     assert abs(account.step_error[-1]) < 1e-3 * account.turnover
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_resumed_account_is_the_same_to_the_bit(tmp_path, ranks):
     whole = account_bed(tmp_path / "whole", bed("fix state all resume/exact 600 bed\nrun 1500", material=WET, ranks=ranks), ranks=ranks)
     account_bed(tmp_path / "broken", bed("fix state all resume/exact 600 bed\nrun 900", material=WET, ranks=ranks), ranks=ranks)
@@ -176,8 +176,9 @@ SETTINGS = ["", "limitForce on", "tangential_damping off", "presliding exponenti
             "rolling_resistance elastic_plastic"]
 
 
-@pytest.mark.parametrize("cohesion", ["", "cohesion capillary"])
-@pytest.mark.parametrize("settings", SETTINGS)
+@pytest.mark.parametrize(("cohesion", "settings"), [
+    pytest.param(cohesion, settings, marks=pytest.mark.full if cohesion and settings else ())
+    for cohesion in ("", "cohesion capillary") for settings in SETTINGS])
 def test_packs_account_as_the_engines_loop_does(tmp_path, monkeypatch, settings, cohesion):
     """In two runs, of grains of two types, some of which are stuck to the floor and to each other."""
     text = DECK.format(cohesion=cohesion, rolling="", settings=settings).replace("stuck id 1:64", "stuck id 1:128")

@@ -136,7 +136,7 @@ def held_by_bridges(frame):
     return (alone & (np.linalg.norm(force + weight[:, None] * [0.0, 0.0, 1.0], axis=1) > 1e-6)).sum()
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_restart_keeps_displacements_and_bridges(tmp_path, ranks):
     """The first forces after a restart are those of the run that wrote it, and so is what follows."""
     edit = (lambda text: text) if ranks == 2 else (lambda text: text.replace("processors 2 1 1\n", ""))

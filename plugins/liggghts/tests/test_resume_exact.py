@@ -34,7 +34,7 @@ def bed(stock, run_command, *, ranks, resume=False, material=BED):
 
 @pytest.mark.parametrize(("stock", "material"), [(False, BED), (True, BED), (False, replace(BED, presliding="partial_slip", **SPRING))],
                          ids=["ours", "stock", "partial slip, rolling spring"])
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_resumed_run_is_the_same_to_the_bit(tmp_path, stock, material, ranks):
     """States every 700 steps, frames every 500: state 1400 is resumed where frame 1500 was written already."""
     states = STATES.format(every=700)
@@ -99,7 +99,7 @@ def test_other_models_than_those_of_the_state_are_refused_or_approximate(tmp_pat
     assert done.code == 0 and "dembark: resumed at step 200 approximately: the atoms or their candidates" in done.output
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_run_that_begins_anew_deletes_no_state(tmp_path, ranks):
     """States of an earlier run in the folder: the run ends with one line before anything is written over."""
     deck = bed(False, STATES.format(every=500) + "run 1200", ranks=ranks)
@@ -118,7 +118,7 @@ def test_state_that_is_not_whole_does_not_stand_in_the_way(tmp_path):
     assert sorted(path.name for path in tmp_path.glob("bed.*.restart")) == ["bed.1000.restart", "bed.500.restart"]
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_stock_command_reads_a_state_exactly_under_its_name_only(tmp_path, ranks):
     states = STATES.format(every=500)
     assert run_deck(tmp_path, bed(False, f"{states}run 700", ranks=ranks), ranks=ranks).code == 0
@@ -197,7 +197,7 @@ def with_fixes(folder, text, lines):
     return text.replace("fix motion all nve/sphere\n", lines)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_fixes_of_the_list_are_resumed_exactly(tmp_path, ranks):
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     wall = liggghts_driver.models(BED, wall="mesh n_meshes 1 meshes plate")

@@ -71,7 +71,7 @@ def test_as_the_stock_model_where_that_is_right(tmp_path, ours, stock):
 
 @pytest.mark.parametrize("settings", ["rolling_resistance constant_torque", "rolling_resistance elastic_plastic",
                                       "rolling_resistance elastic_plastic presliding partial_slip"])
-@pytest.mark.parametrize("cohesion", ["", "cohesion capillary"])
+@pytest.mark.parametrize("cohesion", ["", pytest.param("cohesion capillary", marks=pytest.mark.full)])
 def test_same_motion_in_both_pair_loops(tmp_path, monkeypatch, settings, cohesion):
     """Grains are stuck, collide, part and come back."""
     def frames(name, edit=lambda text: text):

@@ -116,7 +116,7 @@ def test_resumes_to_the_bit(tmp_path: Path) -> None:
     assert (frames[0] == frames[1]).all()
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_films_in_slits_are_those_of_the_solver(ranks: int, tmp_path: Path) -> None:
     """Boxes that open and close slits: 60 steps, as in Python to 1e-9; without films they are elsewhere."""
     scene = standing(0.7)

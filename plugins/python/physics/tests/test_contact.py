@@ -153,7 +153,7 @@ def test_bad_settings(settings, words):
         drop(CONTACT, ONE, **{"time_step": 1e-6, "steps": 5} | settings)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(restitution=st.floats(0.1, 1.0), speed=st.floats(0.05, 2.0), normal_law=st.sampled_from(["hertz", "hooke"]),
        presliding=st.sampled_from(["linear", "partial_slip"]), volume=st.sampled_from([0.0, 1e-10]))
 def test_friction_limit_is_that_of_the_chosen_normal_force(restitution, speed, normal_law, presliding, volume):
