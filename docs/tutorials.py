@@ -16,7 +16,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted((ROOT / "docs/tutorials").glob("*.md"))
-BLOCK = re.compile(r"^```(\w+) ?(\S*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+# A block of code: its head, which is a kind and where it is a file its name, and its text.
+FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 PICTURE = re.compile(r"!\[[^\]]*\]\(\.\./images/tutorials/([\w.]+)\)")
 # Programs that belong to this environment and checkout.
 PROGRAMS = f"{Path(sys.executable).parent}{os.pathsep}{ROOT / 'build/bin'}{os.pathsep}"
@@ -27,7 +28,8 @@ def run(page: Path, folder: Path) -> None:
     other. AssertionError with the output of the block that fails."""
     environment = os.environ | {"PATH": PROGRAMS + os.environ["PATH"], "MPLBACKEND": "agg"}
     known = ""
-    for kind, name, text in BLOCK.findall(page.read_text(encoding="utf-8")):
+    for head, text in FENCE.findall(page.read_text(encoding="utf-8")):
+        kind, _, name = head.partition(" ")
         if name:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_text(text, encoding="utf-8")

@@ -16,6 +16,17 @@ from types import ModuleType
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 
+
+def load_script(name: str = "capillary_errors") -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"docs/{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+FENCE = load_script("tutorials").FENCE
+# After an empty line, or at the beginning of the page.
+INDENTED = re.compile(r"(?:(?<=\n\n)|\A)    .*\n?(?:(?:    .*|[ \t]*)\n?)*?(?=^ {0,3}\S|\Z)", re.MULTILINE)
 SHELL = {"dembark", "make", "liggghts-dembark", "yade", "python", ".venv/bin/python", "mkdir", "cd", "cp", "export", "module"}
 LIGGGHTS = {"pair_style", "fix", "compute", "dump", "thermo_style", "wall", "resume_state", "if", "region", "run"}
 # What a line of a page's "Syntax" has and no command that can be run.
@@ -52,23 +63,16 @@ def _of_engine(block: Block) -> Block:
 
 
 def _of_page(page: Path) -> list[Block]:
-    name, lines = str(page.relative_to(ROOT)), page.read_text(encoding="utf-8").split("\n")
-    found, number = [], 0
-    while number < len(lines):
-        first = number
-        if lines[number].startswith("```"):
-            number = lines.index("```", first + 1)
-            kind = lines[first][3:].strip()
-            found.append(Block(name, first + 2, {"sh": "shell", "lammps": "deck"}.get(kind, kind),
-                               "\n".join(lines[first + 1:number]) + "\n"))
-        elif lines[number].startswith("    ") and (number == 0 or not lines[number - 1].strip()):
-            while number < len(lines) and (lines[number].startswith("    ") or not lines[number].strip()):
-                number += 1
-            text = "\n".join(line[4:] for line in lines[first:number]).rstrip() + "\n"
-            found.append(Block(name, first + 1, _kind(text), text))
-            continue
-        number += 1
-    return found
+    name, text = str(page.relative_to(ROOT)), page.read_text(encoding="utf-8")
+    found = []
+    for one in FENCE.finditer(text):
+        kind = one[1].strip()
+        found.append(Block(name, text.count("\n", 0, one.start()) + 2, {"sh": "shell", "lammps": "deck"}.get(kind, kind), one[2]))
+    rest = FENCE.sub(lambda one: "#" + "\n#" * one[0].count("\n"), text)
+    for one in INDENTED.finditer(rest):
+        inner = re.sub("^    ", "", one[0], flags=re.MULTILINE).rstrip() + "\n"
+        found.append(Block(name, rest.count("\n", 0, one.start()) + 1, _kind(inner), inner))
+    return sorted(found, key=lambda one: one.line)
 
 
 def _kind(text: str) -> str:
@@ -180,10 +184,3 @@ def replaced(command: str) -> tuple[str, str]:
 def not_run(command: str) -> str:
     """Why a command is not run here; empty for those that are."""
     return next((why for pattern, why in NOT_RUN if re.fullmatch(pattern, command)), "")
-
-
-def load_script(name: str = "capillary_errors") -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / f"docs/{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

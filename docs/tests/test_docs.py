@@ -11,12 +11,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from blocks import PAGES, ROOT, Block, blocks, load_script
+from blocks import FENCE, PAGES, ROOT, Block, blocks, load_script
 
 from dembark.validation.engines import call
 
 LINKING = [*PAGES, *sorted((ROOT / "input_decks").glob("*/README.md"))]
-FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 
 

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from blocks import FENCE
 
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
@@ -81,7 +82,7 @@ def test_restitution_of_the_models_of_lammps(tmp_path: Path) -> None:
     page = (Path(__file__).parents[1] / "how-to/migration.md").read_text(encoding="utf-8")
     heads = ("| `hertz/material E e ν … damping", "| `restitution` |")
     tsuji = dict(zip(*(re.findall(r"0\.\d+", line) for line in page.splitlines() if line.startswith(heads)), strict=True))
-    (block,) = re.findall(r"```python\n(import numpy as np\nfrom scipy.*?)```", page, re.DOTALL)
+    (block,) = [one for head, one in FENCE.findall(page) if head == "python" and one.startswith("import numpy as np\nfrom scipy")]
     functions: dict[str, object] = {}
     exec(block, functions)
     mass, stiffness = math.pi / 6 * 0.75**3, 4000

@@ -8,7 +8,7 @@ from functools import cache
 
 import pytest
 import typer
-from blocks import PAGES, ROOT, blocks, commands, logical_lines, parameter_names
+from blocks import FENCE, PAGES, ROOT, blocks, commands, logical_lines, parameter_names
 
 from dembark.postproc import cli as postproc
 from dembark.validation import cli, engines
@@ -18,7 +18,7 @@ TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page 
 ALL = "\n".join(TEXTS.values())
 # Words in backticks, outside of fenced blocks.
 SPANS = sorted({span for text in TEXTS.values()
-                for span in re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL))})
+                for span in re.findall(r"`([^`\n]+)`", FENCE.sub("", text))})
 PLACES = ("benchmarks", "build", "common", "docs", "input_decks", "packaging", "plugins", "postproc", "validation")
 # What a build makes; the test runs without it.
 BUILT = ("build/",)

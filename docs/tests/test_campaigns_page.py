@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
+from blocks import FENCE, ROOT
 
 from dembark.validation.campaigns.spec import shipped
 from dembark.validation.judge.result import QuantityRecord, Result, write
 
-PAGE = (Path(__file__).resolve().parents[3] / "docs/how-to/campaigns.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs/how-to/campaigns.md").read_text(encoding="utf-8")
 
 
 def test_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -21,7 +21,7 @@ def test_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
                  for name in ("apparent_mass_ratio", "stress_ratio_k")]
         write(place / "metrics.json", Result("silo", place.parent.name, "liggghts", tuple(found), parameters={"wall_friction": friction}))
     monkeypatch.chdir(tmp_path)
-    (text,) = re.findall(r"^```py\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    (text,) = [text for head, text in FENCE.findall(PAGE) if head == "py"]
     known: dict[str, object] = {}
     exec(text, known)
     assert list(known["share"]["parameters.wall_friction"]) == [0.2, 0.4] and list(known["share"]["value"]) == [0.8, 0.6]
