@@ -28,7 +28,7 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def write_whole(path: Path, content: bytes) -> Path:
+def write_atomic(path: Path, content: bytes) -> Path:
     """Write `content` so that a reader sees the old file or the complete new one, also after a crash; returns the path."""
     part = path.with_name(f".{path.name}.part-{os.getpid()}")
     try:
@@ -43,8 +43,8 @@ def write_whole(path: Path, content: bytes) -> Path:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write `content` as JSON, see `write_whole`."""
-    write_whole(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
+    """Write `content` as JSON, see `write_atomic`."""
+    write_atomic(path, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
 
 
 def read_json(path: Path) -> dict[str, Any] | None:

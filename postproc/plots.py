@@ -19,7 +19,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import disk_error, write_whole
+from dembark.common.files import disk_error, write_atomic
 
 from .fields.field_set import FieldSet
 from .pictures import saved
@@ -307,4 +307,4 @@ def save(folder: str | Path, figures: Mapping[str, Figure]) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise disk_error(error, folder) from None
-    return [write_whole(folder / f"{name}.png", saved(figure, dots=160.0)) for name, figure in figures.items()]
+    return [write_atomic(folder / f"{name}.png", saved(figure, dots=160.0)) for name, figure in figures.items()]

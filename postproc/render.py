@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from dembark.common.errors import RunError
-from dembark.common.files import write_whole
+from dembark.common.files import write_atomic
 
 from .fields.coarse_graining import interpolate
 from .fields.field_set import FieldSet
@@ -177,7 +177,7 @@ def animate(path: str | Path, scenes: Iterable[Scene], scale: tuple[float, float
     images = [Image.fromarray(image).quantize(64) for image in render(scenes, scale, pixels)]
     content = io.BytesIO()
     images[0].save(content, format="GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
-    return write_whole(Path(path), content.getvalue())
+    return write_atomic(Path(path), content.getvalue())
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ import pandas as pd
 
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
-from dembark.common.files import read_json, write_whole
+from dembark.common.files import read_json, write_atomic
 from dembark.common.lock import held
 from dembark.validation.judge.result import COMPARISON, METRICS, PLAN, as_row, result_files
 
@@ -207,5 +207,5 @@ def export(folder: Path | str, table: str, target: Path | None = None) -> str:
         except ImportError as error:
             raise DembarkError("Parquet files need another package", str(error).partition(".")[0],
                                "install pyarrow, or export CSV") from None
-    write_whole(target, content)
+    write_atomic(target, content)
     return ""

@@ -18,7 +18,7 @@ import xarray
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import write_whole
+from dembark.common.files import write_atomic
 
 from ..fields.field_set import FieldSet
 from ..walls.peaks import Histogram
@@ -101,7 +101,7 @@ def write_netcdf(path: str | Path, data: xarray.Dataset, walls: Iterable[WallStr
         for name, one in groups.items():
             group = file.create_group(f"wall_{name}" if name in {*file.variables, *file.dimensions} else name)
             one.dump_to_store(xarray.backends.H5NetCDFStore(group))
-    return write_whole(Path(path), content.getvalue())
+    return write_atomic(Path(path), content.getvalue())
 
 
 def wall_dataset(stress: WallStress, *, timed: bool = True) -> xarray.Dataset:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import disk_error, move_into_place, write_whole
+from dembark.common.files import disk_error, move_into_place, write_atomic
 
 from ..grains import GrainFrame
 from ..walls.stress import COMPONENTS, WallStress
@@ -82,7 +82,7 @@ class TimeSeries:
                 lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "<Collection>", *self._entries,
                          "</Collection>", "</VTKFile>", ""]
                 move_into_place(self._work, _folder(self.path))
-                write_whole(self.path, "\n".join(lines).encode())
+                write_atomic(self.path, "\n".join(lines).encode())
         except OSError as refused:
             raise disk_error(refused, self.path) from None
         finally:

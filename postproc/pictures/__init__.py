@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dembark.common.errors import RunError
 from dembark.common.extras import missing_extra
-from dembark.common.files import write_whole
+from dembark.common.files import write_atomic
 
 from .. import DumpError
 
@@ -46,7 +46,7 @@ def draw(folder: Path, wanted: Mapping[str, Any] | None) -> list[str]:
             image = packings.picture(replica.parent, **wanted)
     except (DumpError, RunError) as error:
         return [f"No picture: {error}."]
-    write_whole(folder / PICTURE, image)
+    write_atomic(folder / PICTURE, image)
     return []
 
 

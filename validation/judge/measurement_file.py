@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from dembark.common.files import read_json, write_whole
+from dembark.common.files import read_json, write_atomic
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.statistics import Estimate
 
@@ -34,7 +34,7 @@ def write(folder: Path, one: Measured) -> Measured:
     content = {KEY: one.inputs_hash, "measured": dict(one.facts), "values": values,
                "profiles": list(one.found.profiles), "remarks": list(one.found.remarks), "fields": one.fields}
     # Infinite half-widths are kept as Python's JSON writes them: no other program reads this file.
-    write_whole(folder / FILE, (json.dumps(content, indent=1, default=float) + "\n").encode())
+    write_atomic(folder / FILE, (json.dumps(content, indent=1, default=float) + "\n").encode())
     return read(folder, one.inputs_hash) or one
 
 

@@ -12,7 +12,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoes
 from markupsafe import Markup
 
 from dembark.common.errors import RunError
-from dembark.common.files import disk_error, write_whole
+from dembark.common.files import disk_error, write_atomic
 from dembark.common.units import duration
 from dembark.validation.judge.result import Result
 
@@ -60,7 +60,7 @@ def write(gathered: Gathered, chapters: Any) -> Path:
                    "description": gathered.summary.get("description", "")}
         template = _environment(gathered).get_template("report.html.j2")
         write_pdf(template.render(context, full=False), folder / "report.pdf")
-        return write_whole(folder / "report.html", template.render(context, full=True).encode())
+        return write_atomic(folder / "report.html", template.render(context, full=True).encode())
     except OSError as error:
         raise disk_error(error, folder) from None
 
@@ -95,7 +95,7 @@ def write_pdf(html: str, path: Path) -> None:
         reason = " ".join(str(error).split())[:120]
         print(f"dembark: no {path.name}, because Pango is missing ({reason}); report.html holds the same", file=sys.stderr)
         return
-    write_whole(path, HTML(string=html, base_url=str(_HERE)).write_pdf())
+    write_atomic(path, HTML(string=html, base_url=str(_HERE)).write_pdf())
 
 
 def machine(measured: Iterable[Result]) -> list[tuple[str, str]]:

@@ -16,7 +16,7 @@ from datetime import datetime
 from pathlib import Path
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import write_whole
+from dembark.common.files import write_atomic
 from dembark.validation import results
 from dembark.validation.campaigns.plan import Plan, Resources
 
@@ -78,11 +78,11 @@ def _send(folder: Path, site: Site, name: str, used: Resources, places: list[str
     jobs = folder / JOBS
     jobs.mkdir(exist_ok=True)
     elements, script = jobs / f"{name}.runs", jobs / f"{name}.sh"
-    write_whole(elements, "".join(f"{place}\n" for place in places).encode())
+    write_atomic(elements, "".join(f"{place}\n" for place in places).encode())
     words = [sys.executable, "-m", "dembark.validation.runs.job", str(folder), str(elements), *(["--again"] if again else [])]
     # Sites may start jobs without the environment of the submitter.
     body = "".join(f"export {key}={shlex.quote(value)}\n" for key, value in environment().items())
     body += f'exec {shlex.join(words)} --cores {used.cores} "{site.index}"'
-    write_whole(script, site.script(name, jobs / f"{name}.log", used, len(places), after, body, at_a_time).encode())
+    write_atomic(script, site.script(name, jobs / f"{name}.log", used, len(places), after, body, at_a_time).encode())
     script.chmod(0o755)
     return site.send(script)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from dembark.common.errors import DembarkError
-from dembark.common.files import write_json, write_whole
+from dembark.common.files import write_atomic, write_json
 from dembark.common.lock import held
 from dembark.validation import engines, provenance, results
 from dembark.validation.campaigns.estimate import wall_clock
@@ -107,7 +107,7 @@ def enter(folder: Path, file: Path, plan: Plan, chosen: Options, estimates: Mapp
     """Write the copy of the campaign's file into `folder`, and plan.json: what is to be done, who submits it, from where, with what."""
     text = file.read_bytes()
     used = {run.engine.name: run.engine.version for one in plan.series for run in one.runs}
-    write_whole(folder / CAMPAIGN_FILE, text)
+    write_atomic(folder / CAMPAIGN_FILE, text)
     submitted: dict[str, Any] = {
         "at": datetime.now(UTC).isoformat(timespec="seconds"), "file": str(file), "options": asdict(chosen), "host": socket.gethostname(),
         "user": _user(), "decks": str(shipped_root()), "environment": environment(), **provenance.commit(),

@@ -15,7 +15,7 @@ from typing import Any
 
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.extras import advice
-from dembark.common.files import retire, write_whole
+from dembark.common.files import retire, write_atomic
 from dembark.postproc import pictures
 from dembark.validation import analysis, metrics, provenance, results
 from dembark.validation.case.folders import files, find
@@ -213,4 +213,4 @@ def build_report(folder: Path) -> None:
         elif not campaign:
             verification.write(folder)
         (campaign_report if campaign else report).build(folder)
-        write_whole(page, inputs.stamp(page.read_text(encoding="utf-8"), inputs_hash).encode())
+        write_atomic(page, inputs.stamp(page.read_text(encoding="utf-8"), inputs_hash).encode())

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dembark.common.errors import RunError
-from dembark.common.files import write_whole
+from dembark.common.files import write_atomic
 from dembark.validation.judge.result import Comparison
 from dembark.validation.judge.tally import tally
 from dembark.validation.report.build import write
@@ -43,7 +43,7 @@ def _sweep(sweep: Sweep, gathered: Gathered, drawn: Path) -> dict[str, Any]:
     quantities = sweep.quantities()
     chosen, name = quantities[:_PANELS], sweep.name
     tables.write_table_csv(drawn / f"{name}.csv", sweep)
-    write_whole(drawn / f"{name}.tex", tables.latex(sweep, quantities).encode())
+    write_atomic(drawn / f"{name}.tex", tables.latex(sweep, quantities).encode())
     study = figures.study_figure(sweep, chosen)
     shown = [embed(study, drawn, f"{name}-study",
                    "Quantities along the sweep with 95 % intervals; grey dashed: reference of each point.")] if study else []
