@@ -10,6 +10,7 @@ import mmap
 import os
 import re
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -116,20 +117,28 @@ def count_frames(path: Path, count_key: str) -> int:
     return frames
 
 
-def check_impacts(path: Path) -> int:
-    """Number of impacts in an `impacts.txt`; RunError when it is missing, cut off or holds a line that is not eleven finite numbers."""
+def _written(path: Path) -> str:
     if not path.is_file():
         raise RunError(f"the engine wrote no {path.name}")
-    text = path.read_text(encoding="utf-8", errors="replace")
+    return path.read_text(encoding="utf-8", errors="replace")
+
+
+def _finite(words: Iterable[str]) -> bool:
+    """Whether all are finite numbers."""
+    try:
+        return all(math.isfinite(float(word)) for word in words)
+    except ValueError:
+        return False
+
+
+def check_impacts(path: Path) -> int:
+    """Number of impacts in an `impacts.txt`; RunError when it is missing, cut off or holds a line that is not eleven finite numbers."""
+    text = _written(path)
     if not text.startswith("#"):
         raise RunError(f"{path.name} does not begin with a header")
     rows = [line.split() for line in text.splitlines() if not line.startswith("#")]
     for number, row in enumerate(rows, start=1):
-        try:
-            complete = len(row) == _IMPACT_COLUMNS and all(math.isfinite(float(word)) for word in row)
-        except ValueError:
-            complete = False
-        if not complete:
+        if len(row) != _IMPACT_COLUMNS or not _finite(row):
             raise RunError(f"{path.name} is truncated, or holds no finite number, in line {number} of its {len(rows)} impacts")
     if not text.endswith("\n"):
         raise RunError(f"{path.name} is truncated after {len(rows)} impacts")
@@ -138,19 +147,13 @@ def check_impacts(path: Path) -> int:
 
 def check_times(path: Path) -> int:
     """Number of rows of a `time.csv`; RunError when it is missing, cut off or holds something that is not a finite number."""
-    if not path.is_file():
-        raise RunError(f"the engine wrote no {path.name}")
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = _written(path)
     rows = list(csv.reader(text.splitlines()))
     if len(rows) < 2 or rows[0][:3] != ["step", "time", "kinetic_energy"]:
         raise RunError(f"{path.name} has no rows, or no header step,time,kinetic_energy,...")
     if not text.endswith("\n") or any(len(row) != len(rows[0]) for row in rows):
         raise RunError(f"{path.name} is truncated after {len(rows) - 2} rows")
     for row in rows[1:]:
-        try:
-            finite = all(math.isfinite(float(cell)) for cell in row)
-        except ValueError:
-            finite = False
-        if not finite:
+        if not _finite(row):
             raise RunError(f"the run became unstable: {path.name} holds no finite number at step {row[0]}")
     return len(rows) - 1

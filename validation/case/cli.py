@@ -8,7 +8,13 @@ from typing import Annotated
 
 import typer
 
+from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
+from dembark.validation import engines, show
+
+from .deck import write
+from .folders import discover, find, package_root, shipped_root
+from .resolve import portable, resolve, settings
 
 app = typer.Typer()
 
@@ -16,10 +22,6 @@ app = typer.Typer()
 @app.command("cases")
 def show_cases(case: Annotated[str | None, typer.Argument(help="Show the keys, profiles and variants of this case.")] = None) -> None:
     """List the cases, or show one in detail."""
-    from dembark.validation import show
-
-    from .folders import discover, find
-
     console = show.console()
     if case is None:
         console.print(show.case_table(discover().values()))
@@ -43,13 +45,6 @@ def deck(
                       typer.Option("--set", metavar="KEY=VALUE", help='Set a parameter: --set "grain_diameter=4 mm".')] = None,
 ) -> None:
     """Write a deck that runs without the harness. The folder holds the input script with all numbers, the packing and the meshes."""
-    from dembark.common.choices import pick
-    from dembark.validation import engines
-
-    from .deck import write
-    from .folders import find
-    from .resolve import portable, resolve, settings
-
     one = find(case)
     pick(engine, engines.names(), "engine", "in --engine")
     values = portable(resolve(one, profile, variant or next(iter(one.variants)), settings(change or ())))
@@ -73,10 +68,6 @@ def new_case(
     folder: Annotated[Path, typer.Option("--in", help="Folder of your cases; the case gets a folder of its name in it.")] = Path(),
 ) -> None:
     """Write a template of a case that runs."""
-    from dembark.validation import engines
-
-    from .folders import package_root, shipped_root
-
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise DembarkError(f"{name!r} is no name of a case", "", "take lower-case letters, digits and underscores, a letter first")
     if (shipped_root() / name).exists():

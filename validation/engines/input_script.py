@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import jinja2
+
 from dembark.common.choices import Value
 
 from .base import DECK_NOTE, DeckNumber, Engine, end_with_parent, texts
@@ -17,8 +19,6 @@ class InputScript(Engine):
     @classmethod
     def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
         """See Engine. The source is a Jinja template with << >> around expressions, for ${ } and { } have a meaning in decks."""
-        import jinja2  # commands that write no deck need not wait for it
-
         environment = jinja2.Environment(loader=jinja2.FileSystemLoader([str(folder) for folder in folders]),
                                          undefined=jinja2.StrictUndefined,
                                          variable_start_string="<<", variable_end_string=">>",

@@ -1,4 +1,4 @@
-"""How a run ended: by the engine's exit code, messages, files and the disk."""
+"""How far a run is and how it ended: by the engine's output, exit code and files, and the disk."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from dembark.common.files import DISK_FULL, check_impacts, check_times, count_fr
 from dembark.validation.campaigns.plan import Run
 from dembark.validation.case.model import OUTPUTS
 
-from .output import OutputParser
-
 _RESERVE = 4 << 20
 _DUMPS = {"grains": "ATOMS", "contacts": "ENTRIES"}
 # Signals by which a user, a scheduler or the system ends what is sound; the others are faults of the engine.
@@ -23,6 +21,38 @@ _STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal
 
 # What one rank says; it may begin in the middle of a line, because the output of ranks is interleaved.
 _OF_ONE_RANK = re.compile(r"ERROR on proc \d+: ")
+_STEPS = re.compile(r"dembark: steps (\d+) time_step (\S+)")
+_STEP = re.compile(r"\s*(\d+)\s+[-+]?(?:\d|\.\d|nan|inf)")
+
+
+class OutputParser:
+    """Reads an engine's output: the line `dembark: steps N time_step dt`, lines that begin with the step, `dembark: finished`."""
+
+    def __init__(self) -> None:
+        self.steps, self.step, self.time_step, self.finished = 0, 0, 0.0, False
+        self._unfinished = b""
+
+    def feed(self, chunk: bytes) -> bool:
+        """Take some bytes of the output, lines or parts of them; True when something changed."""
+        *lines, self._unfinished = (self._unfinished + chunk).split(b"\n")
+        # Every line is read, also after one that changed something.
+        changes = [self.read(line.decode(errors="replace")) for line in lines]
+        return any(changes)
+
+    def read(self, line: str) -> bool:
+        """Take one line; True when something changed."""
+        announced = _STEPS.match(line)
+        if announced:
+            self.steps, self.time_step = int(announced.group(1)), float(announced.group(2))
+            return True
+        if line.startswith("dembark: finished"):
+            self.finished = True
+            return True
+        step = _STEP.match(line)
+        if step and self.steps and self.step < int(step.group(1)) <= self.steps:
+            self.step = int(step.group(1))
+            return True
+        return False
 
 
 def check_room(run: Run, folder: Path) -> None:

@@ -34,7 +34,7 @@ from dembark.validation.engines import end_with_parent
 from dembark.validation.results import State, lock_file, status_file
 
 from . import outcome, restarts
-from .output import OutputParser
+from .outcome import OutputParser
 
 _RESUMED = re.compile(r"dembark: resumed at step (\d+) (exact|approximate)ly")
 # Gets the changed fields of a run's State.

@@ -12,7 +12,7 @@ from dembark.common.units import duration
 from dembark.validation.results import State
 from dembark.validation.runs.executor import States
 from dembark.validation.runs.monitor import Monitor, describe, headline, state_table
-from dembark.validation.runs.output import OutputParser
+from dembark.validation.runs.outcome import OutputParser
 from dembark.validation.runs.steps import Step
 
 
