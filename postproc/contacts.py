@@ -22,12 +22,8 @@ _DECK: Mapping[str, Column] = {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (
 _DECK_COLUMNS = 12
 _NUMBERED = re.compile(r"\w+\[(\d+)\]")
 # What local/gran/vtk writes.
-_LINES: Mapping[str, Column] = {
-    "first": ("x1", "y1", "z1"),
-    "second": ("x2", "y2", "z2"),
-    "ids": ("id1", "id2"),
-    "forces": ("force[1]", "force[2]", "force[3]"),
-}
+_LINES: Mapping[str, Column] = {"first": ("x1", "y1", "z1"), "second": ("x2", "y2", "z2"), "ids": ("id1", "id2"),
+                                "forces": ("force[1]", "force[2]", "force[3]")}
 # The flag `periodic`, counted from 0: the nearest image says the same.
 _DECK_LEFT_OUT = {8}
 
@@ -55,10 +51,8 @@ class ContactFrame:
 class ContactsDump(TypedDump[ContactFrame]):
     """Contacts as a sequence of ContactFrame, read one at a time."""
 
-    def __init__(
-        self, path: Trajectory, *, skip_truncated: bool = False, stream: bool = False, columns: Mapping[str, Column] | None = None,
-        units: str = "",
-    ) -> None:
+    def __init__(self, path: Trajectory, *, skip_truncated: bool = False, stream: bool = False, columns: Mapping[str, Column] | None = None,
+                 units: str = "") -> None:
         """Open; DumpError for a missing, foreign or truncated file (see open_dump).
 
         Without `columns` the file must be one of dembark's decks, with twelve columns, or of the style local/gran/vtk. Else `columns`

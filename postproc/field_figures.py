@@ -71,9 +71,8 @@ def limits(values: Sequence[Array], centre: float | None = None) -> tuple[float,
     return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
-def image(
-    axes: Any, values: Array, extent: tuple[float, float, float, float], scale: tuple[float, float], paint: str, *, smooth: bool = True
-) -> None:
+def image(axes: Any, values: Array, extent: tuple[float, float, float, float], scale: tuple[float, float], paint: str, *,
+          smooth: bool = True) -> None:
     """A map (rows along y, from below) of cell values; `smooth`: of a field that varies less than from cell to cell."""
     axes.imshow(np.ma.masked_invalid(values), extent=extent, origin="lower", cmap=paint, norm=Normalize(*scale),
                 interpolation="bilinear" if smooth else "nearest", aspect="auto", interpolation_stage="data")

@@ -217,11 +217,9 @@ def grain_frame(raw: RawFrame, where: str, density: float | None = None, say: Sa
     velocities, omegas, forces = (table(*names) if table.has(names) else None for names in _VECTORS)
     # Last: what none of the others has taken.
     extra = {name: table(name) for name in raw.columns if name not in table.taken}
-    return GrainFrame(
-        step=raw.step, low=raw.low, high=raw.high, periodic=raw.periodic, tilt=raw.tilt, ids=table.ids, types=types, positions=positions,
-        wrapped=wrapped, velocities=velocities, omegas=omegas, forces=forces, radii=radii, masses=masses, wall_forces=wall_forces,
-        extra=extra, where=where, time=raw.time,
-    )
+    return GrainFrame(step=raw.step, low=raw.low, high=raw.high, periodic=raw.periodic, tilt=raw.tilt, ids=table.ids, types=types,
+                      positions=positions, wrapped=wrapped, velocities=velocities, omegas=omegas, forces=forces, radii=radii, masses=masses,
+                      wall_forces=wall_forces, extra=extra, where=where, time=raw.time)
 
 
 def _wall(name: str) -> tuple[str, ...]:
@@ -231,16 +229,8 @@ def _wall(name: str) -> tuple[str, ...]:
 class GrainsDump(TypedDump[GrainFrame]):
     """Grains as a sequence of GrainFrame, read one at a time: any file that open_dump reads."""
 
-    def __init__(
-        self,
-        path: Trajectory,
-        *,
-        skip_truncated: bool = False,
-        stream: bool = False,
-        columns: Sequence[str] | None = None,
-        density: float | None = None,
-        units: str = "",
-    ) -> None:
+    def __init__(self, path: Trajectory, *, skip_truncated: bool = False, stream: bool = False, columns: Sequence[str] | None = None,
+                 density: float | None = None, units: str = "") -> None:
         """Open; DumpError for a missing, foreign or truncated file (see open_dump).
 
         `density` (kg/m^3) is that of solid grains where the dump has no masses, `columns` are those of a binary dump, `units` is the unit

@@ -13,12 +13,8 @@ from .replica import Array
 from .statistics import ONE_SAMPLE, Estimate, TimeBlocks, jackknife, over_replicas
 
 
-def resampled(
-    measure: Callable[[NDArray[np.bool_], NDArray[np.bool_]], float],
-    frames: TimeBlocks,
-    places: NDArray[np.int64] | None = None,
-    overlap: float = 1.0,
-) -> Estimate:
+def resampled(measure: Callable[[NDArray[np.bool_], NDArray[np.bool_]], float], frames: TimeBlocks, places: NDArray[np.int64] | None = None,
+              overlap: float = 1.0) -> Estimate:
     """`measure(keep_frames, keep_places)` with an interval from what varies in time and, with `places`, from place to place.
 
     `overlap` is what sharing samples leaves of the variance among places. The wider of the two
@@ -41,10 +37,9 @@ def pooled(replicas: Sequence[Mapping[str, Estimate]], name: str) -> Estimate:
     return over_replicas([one[name] for one in replicas])
 
 
-def profile(
-    name: str, title: str, along: str, across: str, place: Array, values: Sequence[Array], *, half: Array | None = None,
-    vertical: bool = False, reference: Array | None = None, reference_half: Array | None = None, reference_label: str = "", note: str = "",
-) -> dict[str, Any]:
+def profile(name: str, title: str, along: str, across: str, place: Array, values: Sequence[Array], *, half: Array | None = None,
+            vertical: bool = False, reference: Array | None = None, reference_half: Array | None = None, reference_label: str = "",
+            note: str = "") -> dict[str, Any]:
     """A profile for figure and CSV: `values` of each replica at the same `place`; the band is Student's interval over replicas (three or
     more), the range of two, or for one the half-widths `half` of its 95 % intervals, where all are known.
 

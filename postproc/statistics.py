@@ -170,9 +170,8 @@ def replica_mean(values: Sequence[float], confidence: float = CONFIDENCE) -> Est
     return Estimate(float(data.mean()), half, f"{len(data)} replicas", tuple(map(float, data)))
 
 
-def jackknife(
-    measure: Callable[[NDArray[np.bool_]], float], groups: NDArray[np.int64], confidence: float = CONFIDENCE, name: str = "groups"
-) -> Estimate:
+def jackknife(measure: Callable[[NDArray[np.bool_]], float], groups: NDArray[np.int64], confidence: float = CONFIDENCE,
+              name: str = "groups") -> Estimate:
     """Delete-a-group jackknife of `measure(keep)`, which computes a quantity from the samples where the mask `keep` is true.
 
     `groups` (samples,) numbers the group of each sample, `name` says what they are; groups should be independent of each other.

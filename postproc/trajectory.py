@@ -80,15 +80,9 @@ class GrainsParser(TopologyReaderBase):
     def parse(self, **kwargs: Any) -> Topology:
         """Topology with one residue and one segment."""
         grains = _grains(self.filename, kwargs).roster
-        attributes = [
-            topologyattrs.Atomids(grains["ids"]),
-            topologyattrs.Atomtypes(grains["types"].astype(str).astype(object)),
-            topologyattrs.Radii(grains["radii"]),
-            topologyattrs.Masses(grains["masses"]),
-            topologyattrs.Resids(np.array([1])),
-            topologyattrs.Resnums(np.array([1])),
-            topologyattrs.Segids(np.array(["DEM"], dtype=object)),
-        ]
+        attributes = [topologyattrs.Atomids(grains["ids"]), topologyattrs.Atomtypes(grains["types"].astype(str).astype(object)),
+                      topologyattrs.Radii(grains["radii"]), topologyattrs.Masses(grains["masses"]), topologyattrs.Resids(np.array([1])),
+                      topologyattrs.Resnums(np.array([1])), topologyattrs.Segids(np.array(["DEM"], dtype=object))]
         return Topology(len(grains["ids"]), 1, 1, attrs=attributes)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dembark.postproc import ContactFrame, GrainFrame
-from dembark.postproc.fields.rings import Fields, Rings, Zones, coarse_grain
+from dembark.postproc.fields.rings import Rings, RingSums, Zones, coarse_grain
 from dembark.postproc.measurement import Array, Measurement, Replica, Value
 from dembark.postproc.output import cf_dataset, variable, with_interval
 from dembark.postproc.replica import cached_per_replica
@@ -40,7 +40,7 @@ class Silo:
     `wall_error`: force of the wall on the grains less that of time.csv, over the `weight` (N)."""
 
     rings: Rings
-    fields: Fields
+    fields: RingSums
     zones: Array
     column: Array
     wall: Array
@@ -91,7 +91,7 @@ def read(replica: Replica) -> Silo:
     inside = np.nonzero((cells.heights > 0.0) & (cells.heights < height))[0]
     recorder = WallRecorder(side, cylinder_patches(side, 1, cells.vertical[inside[0] : inside[-1] + 2]), keep_series=False)
 
-    def of_frame(grains: GrainFrame, contacts: ContactFrame) -> tuple[Fields, Zones]:
+    def of_frame(grains: GrainFrame, contacts: ContactFrame) -> tuple[RingSums, Zones]:
         walls = [wall_contacts(grains, side), wall_contacts(grains, base)]
         return coarse_grain(grains, contacts, walls, cells, layers, lambda place: vessel.wall_shares(place, sectors))
 

@@ -10,7 +10,7 @@ from dembark.input_decks.silo.column import wall_pull
 from dembark.input_decks.silo.fields import Silo
 from dembark.input_decks.silo.quantities import moving_mean
 from dembark.input_decks.silo.silo_geometry import Cylinder, Slab
-from dembark.postproc.fields.rings import Fields, Rings
+from dembark.postproc.fields.rings import Rings, RingSums
 from dembark.postproc.statistics import exact
 
 NAMES = ("mass", "volume", "net", "wall", "zz", "rr", "tt", "zr", "rz")
@@ -20,7 +20,7 @@ def silo(height: float) -> Silo:
     cells = Rings.around(0.02, height, 0.004, 0.002)
     rings, layers = len(cells.radii), len(cells.heights)
     sums = {name: np.full((rings, layers), 2.0) for name in NAMES}
-    fields = Fields(3, **sums, through_rings=np.ones((rings + 1, layers)), through_layers=np.ones((rings, layers + 1)))
+    fields = RingSums(3, **sums, through_rings=np.ones((rings + 1, layers)), through_layers=np.ones((rings, layers + 1)))
     return Silo(cells, fields, np.ones((3, 4, 5, rings, 2)), np.full((3, layers), 7.0), np.full((layers, 2), 5.0), exact(0.0), 1.0)
 
 

@@ -34,9 +34,8 @@ class _Header:
 class BinaryDump(Dump):
     """The frames of a binary dump; see Dump. It holds numbers only: `columns` names them in the order of the deck's `dump` command."""
 
-    def __init__(
-        self, path: str | Path, *, columns: Sequence[str] | None, skip_truncated: bool = False, stream: bool = False, units: str = ""
-    ) -> None:
+    def __init__(self, path: str | Path, *, columns: Sequence[str] | None, skip_truncated: bool = False, stream: bool = False,
+                 units: str = "") -> None:
         """Open; DumpError for a missing, foreign or truncated file, or when the columns are not as many as are in it."""
         self._source = Source(Path(path))
         if any(self._source.begins_with(struct.pack("=q", -len(name)) + name) for name in _FOREIGN):

@@ -17,9 +17,8 @@ from .vtk import VtkFile
 Trajectory = str | Path | Sequence[str | Path]
 
 
-def open_dump(
-    path: Trajectory, skip_truncated: bool = False, *, stream: bool = False, columns: Sequence[str] | None = None, units: str = ""
-) -> Dump:
+def open_dump(path: Trajectory, skip_truncated: bool = False, *, stream: bool = False, columns: Sequence[str] | None = None,
+              units: str = "") -> Dump:
     """Open text or binary dumps, gzipped or not, or VTK files of `dump custom/vtk`, `atom/vtk` and `local/gran/vtk`.
 
     `path` is a file or, where each step has its own, a pattern such as "post/dump*.dump" or "post/grains*.vtk", or a list of files.

@@ -40,10 +40,8 @@ def _fault(one: Dump, entry: Entry) -> str:
 class SeriesDump(Dump):
     """The frames of several files as one trajectory; see Dump. `open_one` opens a file without making its index."""
 
-    def __init__(
-        self, files: Sequence[Path], open_one: Callable[[Path], Dump], *, skip_truncated: bool = False, stream: bool = False,
-        units: str = "",
-    ) -> None:
+    def __init__(self, files: Sequence[Path], open_one: Callable[[Path], Dump], *, skip_truncated: bool = False, stream: bool = False,
+                 units: str = "") -> None:
         """Open; DumpError for a missing, foreign or truncated file."""
         self._files, self._open_one = files, open_one
         super().__init__(files[0], skip_truncated=skip_truncated, stream=stream, units=units)

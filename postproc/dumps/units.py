@@ -43,15 +43,11 @@ class UnitStyle:
 
 
 # The velocity of `electron` is in Bohr radii over sqrt(dalton bohr^2 / hartree), not over its unit of time, the femtosecond.
-_STYLES = {
-    "si": UnitStyle(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
-    "cgs": UnitStyle(1e-2, 1e-3, 1.0, 1e-2, 1e-5, 1e3),
-    "micro": UnitStyle(1e-6, 1e-15, 1e-6, 1.0, 1e-9, 1e3),
-    "nano": UnitStyle(1e-9, 1e-21, 1e-9, 1.0, 1e-12, 1e6),
-    "real": UnitStyle(1e-10, 1e-3 / _AVOGADRO, 1e-15, 1e5, 1e3 * _CALORIE / _AVOGADRO / 1e-10, 1e3),
-    "metal": UnitStyle(1e-10, 1e-3 / _AVOGADRO, 1e-12, 1e2, _ELECTRONVOLT / 1e-10, 1e3),
-    "electron": UnitStyle(_BOHR, _DALTON, 1e-15, math.sqrt(_HARTREE / _DALTON), _HARTREE / _BOHR, _DALTON / _BOHR**3),
-}
+_STYLES = {"si": UnitStyle(1.0, 1.0, 1.0, 1.0, 1.0, 1.0), "cgs": UnitStyle(1e-2, 1e-3, 1.0, 1e-2, 1e-5, 1e3),
+           "micro": UnitStyle(1e-6, 1e-15, 1e-6, 1.0, 1e-9, 1e3), "nano": UnitStyle(1e-9, 1e-21, 1e-9, 1.0, 1e-12, 1e6),
+           "real": UnitStyle(1e-10, 1e-3 / _AVOGADRO, 1e-15, 1e5, 1e3 * _CALORIE / _AVOGADRO / 1e-10, 1e3),
+           "metal": UnitStyle(1e-10, 1e-3 / _AVOGADRO, 1e-12, 1e2, _ELECTRONVOLT / 1e-10, 1e3),
+           "electron": UnitStyle(_BOHR, _DALTON, 1e-15, math.sqrt(_HARTREE / _DALTON), _HARTREE / _BOHR, _DALTON / _BOHR**3)}
 _DIMENSIONS = [(re.compile(pattern), dimension) for pattern, dimension in (
     (r"id|type|mol|procp?1?|i[xyz]|[xyz]su?", "1"), (r"[xyz]u?|radius|diameter|delta", "length"), ("mass", "mass"),
     ("density", "density"), (r"v[xyz]", "velocity"), (r"omega[xyz]", "spin"), (r"f[xyz]|f_force_\w+\[[123]\]", "force"),

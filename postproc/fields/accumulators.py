@@ -88,29 +88,17 @@ class FieldSums:
         kinetic = kinetic / volume
         density = mass / volume
         contacts = self.contacts
-        values = {
-            "density": density,
-            "momentum": momentum / volume,
-            "velocity": mean,
-            "solid_fraction": grains[..., VOLUME] / volume,
-            "kinetic_stress": kinetic,
-            "temperature": ratio(np.maximum(np.trace(kinetic, axis1=-2, axis2=-1), 0.0), 3.0 * density),
-            "velocity_gradient": gradient,
-            "strain_rate": 0.5 * (gradient + np.swapaxes(gradient, -1, -2)),
-            "vorticity": np.stack([gradient[..., c, b] - gradient[..., b, c] for b, c in ((1, 2), (2, 0), (0, 1))], axis=-1),
-            "boundary_force": self.boundary / volume,
-            "grain_count": grains[..., NUMBER],
-        }
+        values = {"density": density, "momentum": momentum / volume, "velocity": mean, "solid_fraction": grains[..., VOLUME] / volume,
+                  "kinetic_stress": kinetic, "temperature": ratio(np.maximum(np.trace(kinetic, axis1=-2, axis2=-1), 0.0), 3.0 * density),
+                  "velocity_gradient": gradient, "strain_rate": 0.5 * (gradient + np.swapaxes(gradient, -1, -2)),
+                  "vorticity": np.stack([gradient[..., c, b] - gradient[..., b, c] for b, c in ((1, 2), (2, 0), (0, 1))], axis=-1),
+                  "boundary_force": self.boundary / volume, "grain_count": grains[..., NUMBER]}
         liquid = grains[..., LIQUID]
         if contacts is not None:
             contact_stress = contacts[..., STRESS].reshape(*self.grid.shape, 3, 3) / volume
-            values |= {
-                "contact_stress": contact_stress,
-                "stress": contact_stress + kinetic,
-                "coordination": ratio(grains[..., TOUCHES], grains[..., NUMBER]),
-                "fabric": ratio(full_tensor(contacts[..., FABRIC]), contacts[..., TOUCHING]),
-                "contact_count": contacts[..., COUNT],
-            }
+            values |= {"contact_stress": contact_stress, "stress": contact_stress + kinetic,
+                       "coordination": ratio(grains[..., TOUCHES], grains[..., NUMBER]),
+                       "fabric": ratio(full_tensor(contacts[..., FABRIC]), contacts[..., TOUCHING]), "contact_count": contacts[..., COUNT]}
             if self.power:
                 values |= {"dissipated_power": contacts[..., POWER] / volume, "friction_power": contacts[..., FRICTION] / volume}
             liquid = liquid + contacts[..., BRIDGED]

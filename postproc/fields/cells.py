@@ -73,11 +73,9 @@ class CellTotals:
         def masked(values: Array) -> Array:
             return np.where(thin.reshape(*thin.shape, *(1,) * (values.ndim - 3)), np.nan, values)
 
-        values = {
-            "density": density, "velocity": velocity, "solid_fraction": self.volume / all_volume, "kinetic_stress": kinetic,
-            "temperature": ratio(np.maximum(np.trace(kinetic, axis1=-2, axis2=-1), 0.0), 3.0 * density), "contact_stress": contact,
-            "stress": kinetic + contact,
-        }
+        values = {"density": density, "velocity": velocity, "solid_fraction": self.volume / all_volume, "kinetic_stress": kinetic,
+                  "temperature": ratio(np.maximum(np.trace(kinetic, axis1=-2, axis2=-1), 0.0), 3.0 * density), "contact_stress": contact,
+                  "stress": kinetic + contact}
         counts = {"grain_count": self.grains, "contact_count": self.contacts}
         return FieldSet(self.grid, self.frames, {name: masked(one) for name, one in values.items()} | counts, thin)
 
@@ -102,22 +100,13 @@ def cell_totals(grains: GrainFrame, contacts: ContactFrame | None, grid: Grid, w
         sums = [np.bincount(place, weights=column, minlength=grid.cells + 1)[: grid.cells] for column in columns]
         return np.stack(sums, axis=-1).reshape(*grid.shape, *values.shape[1:]).astype(float, copy=False)
 
-    return CellTotals(
-        grid,
-        1,
-        summed(home, np.ones(len(home))),
-        summed(where, np.ones(len(where))),
-        summed(home, volume(grains.radii)),
-        summed(home, mass),
-        summed(home, mass[:, None] * velocity),
-        summed(home, symmetric_parts(mass[:, None] * velocity, velocity)),
-        summed(where, -np.einsum("na,nb->nab", force, branch).reshape(len(force), 9)),
-    )
+    return CellTotals(grid, 1, summed(home, np.ones(len(home))), summed(where, np.ones(len(where))), summed(home, volume(grains.radii)),
+                      summed(home, mass), summed(home, mass[:, None] * velocity),
+                      summed(home, symmetric_parts(mass[:, None] * velocity, velocity)),
+                      summed(where, -np.einsum("na,nb->nab", force, branch).reshape(len(force), 9)))
 
 
-def cell_average(
-    frames: Iterable[tuple[GrainFrame, ContactFrame | None]], grid: Grid, *, least_contacts: int = LEAST_CONTACTS
-) -> FieldSet:
+def cell_average(frames: Iterable[tuple[GrainFrame, ContactFrame | None]], grid: Grid, *, least_contacts: int = LEAST_CONTACTS) -> FieldSet:
     """Averages over `frames` of (grains, contacts), read one at a time; DembarkError when there are none."""
     total: CellTotals | None = None
     for grains, contacts in frames:

@@ -41,20 +41,9 @@ class WallContacts:
     forces: Array
 
 
-def coarse_grain(
-    grains: GrainFrame,
-    contacts: ContactFrame | None,
-    grid: Grid,
-    *,
-    kernel: str = "gaussian",
-    width: float,
-    walls: Sequence[WallContacts] = (),
-    mean_velocity: Array | None = None,
-    threads: int | None = None,
-    closed: bool = False,
-    liquid: str = "liquid_volume",
-    power: str = "dissipated_power",
-) -> FieldSums:
+def coarse_grain(grains: GrainFrame, contacts: ContactFrame | None, grid: Grid, *, kernel: str = "gaussian", width: float,
+                 walls: Sequence[WallContacts] = (), mean_velocity: Array | None = None, threads: int | None = None, closed: bool = False,
+                 liquid: str = "liquid_volume", power: str = "dissipated_power") -> FieldSums:
     """Sums of one frame over the cells of `grid`, with a `kernel` (gaussian, lucy, heaviside) of `width` (m).
 
     Frames are added (`+`) and give their mean by `.fields()`. What lies beyond the grid is lost; with `closed`, the kernel of a grain

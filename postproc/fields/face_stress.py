@@ -45,9 +45,8 @@ class FaceStress:
         return sum(np.diff(face, axis=axis) / self.grid.spacing[axis] for axis, face in enumerate(self.faces))
 
 
-def face_stress(
-    grains: GrainFrame, contacts: ContactFrame | None, grid: Grid, *, width: float, walls: Sequence[WallContacts] = ()
-) -> FaceStress:
+def face_stress(grains: GrainFrame, contacts: ContactFrame | None, grid: Grid, *, width: float,
+                walls: Sequence[WallContacts] = ()) -> FaceStress:
     """Contact stress of one frame on the faces of `grid`, with the Gaussian kernel of `width` (m).
 
     In a static frame, minus its divergence plus `boundary_force` plus density times gravity (see Fields) is zero in every cell but for
@@ -95,8 +94,5 @@ def _add(first: Array, branch: Array, forces: Array, grid: Grid, kernel: Kernel,
             # A window that reaches beyond the grid repeats the last face, which counts once.
             once = np.diff(edges[normal], axis=1, prepend=-1) > 0
             flux *= once.reshape(len(once), *(-1 if axis == normal else 1 for axis in range(3)))
-            np.add.at(
-                faces[normal],
-                (index[0][:, :, None, None], index[1][:, None, :, None], index[2][:, None, None, :]),
-                flux[..., None] * forces[:, None, None, None, :],
-            )
+            np.add.at(faces[normal], (index[0][:, :, None, None], index[1][:, None, :, None], index[2][:, None, None, :]),
+                      flux[..., None] * forces[:, None, None, None, :])

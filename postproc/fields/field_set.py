@@ -14,27 +14,18 @@ from .grid import Grid
 Array = NDArray[np.float64]
 
 # Unit and long name of every field.
-_FIELDS = {
-    "density": ("kg m-3", "bulk density"),
-    "momentum": ("kg m-2 s-1", "momentum density"),
-    "velocity": ("m s-1", "mean velocity by mass"),
-    "solid_fraction": ("1", "volume of grains per volume"),
-    "kinetic_stress": ("Pa", "kinetic stress, compression positive"),
-    "temperature": ("m2 s-2", "granular temperature"),
-    "velocity_gradient": ("s-1", "velocity gradient, component [a, b] = d v_a / d x_b"),
-    "strain_rate": ("s-1", "strain rate"),
-    "vorticity": ("s-1", "curl of the velocity"),
-    "boundary_force": ("N m-3", "force density of walls on grains"),
-    "contact_stress": ("Pa", "contact stress, compression positive"),
-    "stress": ("Pa", "total stress, compression positive"),
-    "coordination": ("1", "mean number of contacts of a grain with others"),
-    "fabric": ("1", "fabric tensor of contact normals, of trace 1"),
-    "dissipated_power": ("W m-3", "power of contact forces lost by the grains"),
-    "friction_power": ("W m-3", "tangential part of the power of contact forces"),
-    "liquid_content": ("1", "volume of liquid per volume"),
-    "grain_count": ("1", "grains sampled, summed over frames"),
-    "contact_count": ("1", "contacts sampled, summed over frames"),
-}
+_FIELDS = {"density": ("kg m-3", "bulk density"), "momentum": ("kg m-2 s-1", "momentum density"),
+           "velocity": ("m s-1", "mean velocity by mass"), "solid_fraction": ("1", "volume of grains per volume"),
+           "kinetic_stress": ("Pa", "kinetic stress, compression positive"), "temperature": ("m2 s-2", "granular temperature"),
+           "velocity_gradient": ("s-1", "velocity gradient, component [a, b] = d v_a / d x_b"), "strain_rate": ("s-1", "strain rate"),
+           "vorticity": ("s-1", "curl of the velocity"), "boundary_force": ("N m-3", "force density of walls on grains"),
+           "contact_stress": ("Pa", "contact stress, compression positive"), "stress": ("Pa", "total stress, compression positive"),
+           "coordination": ("1", "mean number of contacts of a grain with others"),
+           "fabric": ("1", "fabric tensor of contact normals, of trace 1"),
+           "dissipated_power": ("W m-3", "power of contact forces lost by the grains"),
+           "friction_power": ("W m-3", "tangential part of the power of contact forces"),
+           "liquid_content": ("1", "volume of liquid per volume"), "grain_count": ("1", "grains sampled, summed over frames"),
+           "contact_count": ("1", "contacts sampled, summed over frames")}
 
 
 @dataclass(frozen=True, eq=False)

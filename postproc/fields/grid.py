@@ -149,8 +149,5 @@ def check_periods(grid: Grid, frame: GrainFrame) -> None:
         period = float(frame.high[axis] - frame.low[axis])
         if grid.periodic[axis] and not (frame.periodic[axis] and abs(grid.high[axis] - grid.low[axis] - period) <= 1e-9 * period):
             flag = "" if frame.periodic[axis] else "not "
-            raise DembarkError(
-                f"the grid is periodic along {'xyz'[axis]} over {grid.high[axis] - grid.low[axis]:.9g} m",
-                f"the box at step {frame.step} is {flag}periodic there, {period:.9g} m long",
-                "both must agree",
-            )
+            raise DembarkError(f"the grid is periodic along {'xyz'[axis]} over {grid.high[axis] - grid.low[axis]:.9g} m",
+                               f"the box at step {frame.step} is {flag}periodic there, {period:.9g} m long", "both must agree")

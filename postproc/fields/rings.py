@@ -8,7 +8,7 @@ vectors that turn with the angle,
     K_n(r; s) = exp(-(r^2 + s^2) / 2 w^2) I_n(r s / w^2) / (2 pi w^2),    n = 0, 1, 2,
 
 I_n being the modified Bessel functions. Cells are rings; what they hold are integrals of K_n, so mass is conserved to round-off, and the
-momentum that flows through the faces of a ring is balanced by its weight and the force of the walls (Fields.unbalanced).
+momentum that flows through the faces of a ring is balanced by its weight and the force of the walls (RingSums.unbalanced).
 
 The integrals are taken from tables, one over the radius and one over the height of a point, that cubic splines go through, to 1e-6. A
 spline is a sum of B-splines (de Boor, A Practical Guide to Splines, 1978), of which four do not vanish at a place. So points are summed
@@ -170,7 +170,7 @@ class _Table:
 
 
 @dataclass
-class Fields:
+class RingSums:
     """Sums over `frames` frames, compression positive; (k, l) unless said otherwise.
 
     `mass` (kg) and `volume` (m3) of grains; upward forces (N): `net`, of contacts and gravity on grains, and `wall`, of walls; stress
@@ -191,10 +191,10 @@ class Fields:
     through_rings: Array
     through_layers: Array
 
-    def __add__(self, other: Fields) -> Fields:
-        return Fields(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
+    def __add__(self, other: RingSums) -> RingSums:
+        return RingSums(**{one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)})
 
-    def padded(self, more: tuple[tuple[int, int], tuple[int, int]]) -> Fields:
+    def padded(self, more: tuple[tuple[int, int], tuple[int, int]]) -> RingSums:
         """The same with empty rings and layers before and after, `more` as in numpy.pad."""
         sums: dict[str, Any] = {one.name: np.pad(getattr(self, one.name), more) for one in fields(self) if one.name != "frames"}
         return replace(self, **sums)
@@ -217,14 +217,8 @@ class Zones:
     column: Array
 
 
-def coarse_grain(
-    grains: GrainFrame,
-    contacts: ContactFrame,
-    walls: Sequence[WallContacts],
-    rings: Rings,
-    layers: Array,
-    sector_shares: Callable[[Array], Array],
-) -> tuple[Fields, Zones]:
+def coarse_grain(grains: GrainFrame, contacts: ContactFrame, walls: Sequence[WallContacts], rings: Rings, layers: Array,
+                 sector_shares: Callable[[Array], Array]) -> tuple[RingSums, Zones]:
     """Fields of one frame.
 
     `layers` (l, zones): which layers belong to the zones; `sector_shares(places)`: shares (m, sectors) of places (m, 3) in the sectors.
@@ -248,20 +242,10 @@ def coarse_grain(
 
     vertical, even, odd, outward, upward = contact + flow
     even_sum, odd_sum = ringed(zero, even), ringed(two, odd)
-    found = Fields(
-        frames=1,
-        mass=ringed(zero, mass),
-        volume=ringed(zero, volume),
-        net=ringed(zero, net),
-        wall=ringed(zero, wall),
-        zz=ringed(zero, vertical),
-        rr=even_sum + odd_sum,
-        tt=even_sum - odd_sum,
-        zr=ringed(one, outward),
-        rz=ringed(one, upward),
-        through_rings=2.0 * np.pi * rings.radial[:, None] * ringed(border, contact[3]),
-        through_layers=ringed(zero, contact[0], level),
-    )
+    found = RingSums(frames=1, mass=ringed(zero, mass), volume=ringed(zero, volume), net=ringed(zero, net), wall=ringed(zero, wall),
+                   zz=ringed(zero, vertical), rr=even_sum + odd_sum, tt=even_sum - odd_sum, zr=ringed(one, outward), rz=ringed(one, upward),
+                   through_rings=2.0 * np.pi * rings.radial[:, None] * ringed(border, contact[3]),
+                   through_layers=ringed(zero, contact[0], level))
     parts = layer @ layers
     return found, Zones(lined.zoned(parts, sector_shares) + carried.zoned(parts, sector_shares), found.zz.sum(axis=0))
 

@@ -65,11 +65,9 @@ class FieldAverages:
     what cannot be, before any frame is averaged.
     """
 
-    def __init__(
-        self, chosen: Selection, *, kernel: str = "gaussian", width: str = "1.5d", grid: str | None = None, spacing: str | None = None,
-        box: str | None = None, average: str = "all", walls: Iterable[str] = (), cells: bool = False, least_contacts: int = 3000,
-        only: str | None = None, threads: int | None = None, show: Show | None = None,
-    ) -> None:
+    def __init__(self, chosen: Selection, *, kernel: str = "gaussian", width: str = "1.5d", grid: str | None = None,
+                 spacing: str | None = None, box: str | None = None, average: str = "all", walls: Iterable[str] = (), cells: bool = False,
+                 least_contacts: int = 3000, only: str | None = None, threads: int | None = None, show: Show | None = None) -> None:
         if grid is not None and spacing is not None:
             raise DembarkError("--grid and --spacing are both given", "", "give one of them")
         self.chosen, self.cells, self.least_contacts, self.threads = chosen, cells, least_contacts, threads

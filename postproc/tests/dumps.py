@@ -25,20 +25,9 @@ def _lines(table: Any) -> str:
     return "".join([row % tuple(numbers) for numbers in table[:, ~same].tolist()])
 
 
-def grains_text(
-    step: int,
-    positions: Any,
-    radii: Any,
-    *,
-    velocities: Any = None,
-    masses: Any = None,
-    types: Any = None,
-    walls: Mapping[str, Any] | None = None,
-    images: Any = None,
-    box: Any = BOX,
-    flags: str = "ff ff ff",
-    order: Any = None,
-) -> str:
+def grains_text(step: int, positions: Any, radii: Any, *, velocities: Any = None, masses: Any = None, types: Any = None,
+                walls: Mapping[str, Any] | None = None, images: Any = None, box: Any = BOX, flags: str = "ff ff ff",
+                order: Any = None) -> str:
     """One frame of a grains.dump; `order` shuffles its lines."""
     count = len(positions)
     zero = np.zeros((count, 3))

@@ -13,32 +13,16 @@ from dembark.postproc.grains import GrainFrame, cell
 FREE = (False, False, False)
 
 
-def grain_frame(
-    positions: Any, *, radii: Any = 0.5, masses: Any = 1.0, velocities: Any = 0.0, omegas: Any = 0.0, low: Any = (0, 0, 0),
-    high: Any = (1, 1, 1),
-    periodic: Any = FREE, tilt: Any = (0, 0, 0), extra: Any = None,
-) -> GrainFrame:  # fmt: skip
+def grain_frame(positions: Any, *, radii: Any = 0.5, masses: Any = 1.0, velocities: Any = 0.0, omegas: Any = 0.0, low: Any = (0, 0, 0),
+                high: Any = (1, 1, 1), periodic: Any = FREE, tilt: Any = (0, 0, 0), extra: Any = None) -> GrainFrame:
     """A frame of n grains; numbers stand for all of them."""
     positions = np.asarray(positions, float).reshape(-1, 3)
     count = len(positions)
-    return GrainFrame(
-        step=7,
-        low=np.asarray(low, float),
-        high=np.asarray(high, float),
-        periodic=np.asarray(periodic, bool),
-        ids=np.arange(1, count + 1),
-        types=np.ones(count, int),
-        positions=positions,
-        wrapped=positions,
-        velocities=np.zeros((count, 3)) + velocities,
-        omegas=None if omegas is None else np.zeros((count, 3)) + omegas,
-        forces=np.zeros((count, 3)),
-        radii=np.zeros(count) + radii,
-        masses=np.zeros(count) + masses,
-        wall_forces={},
-        tilt=np.asarray(tilt, float),
-        extra=extra or {},
-    )
+    return GrainFrame(step=7, low=np.asarray(low, float), high=np.asarray(high, float), periodic=np.asarray(periodic, bool),
+                      ids=np.arange(1, count + 1), types=np.ones(count, int), positions=positions, wrapped=positions,
+                      velocities=np.zeros((count, 3)) + velocities, omegas=None if omegas is None else np.zeros((count, 3)) + omegas,
+                      forces=np.zeros((count, 3)), radii=np.zeros(count) + radii, masses=np.zeros(count) + masses, wall_forces={},
+                      tilt=np.asarray(tilt, float), extra=extra or {})
 
 
 def contact_frame(grains: GrainFrame, pairs: Any, forces: Any, extra: Any = None) -> ContactFrame:
@@ -55,17 +39,12 @@ def contact_frame(grains: GrainFrame, pairs: Any, forces: Any, extra: Any = None
 def random_frame(seed: int, count: int = 12, contacts: int = 18, **how: Any) -> tuple[GrainFrame, ContactFrame]:
     """Grains anywhere in the unit box with any velocities, and contacts of any branch and force between any of them."""
     random = np.random.default_rng(seed)
-    grains = grain_frame(
-        random.uniform(0, 1, (count, 3)), radii=random.uniform(0.02, 0.05, count), masses=random.uniform(1, 2, count),
-        velocities=random.normal(size=(count, 3)), omegas=random.normal(size=(count, 3)),
-        extra={"liquid_volume": random.uniform(size=count)},
-        **how,
-    )  # fmt: skip
+    grains = grain_frame(random.uniform(0, 1, (count, 3)), radii=random.uniform(0.02, 0.05, count), masses=random.uniform(1, 2, count),
+                         velocities=random.normal(size=(count, 3)), omegas=random.normal(size=(count, 3)),
+                         extra={"liquid_volume": random.uniform(size=count)}, **how)
     pairs = random.integers(0, count, (contacts, 2))
-    frame = ContactFrame(
-        7, grains.wrapped[pairs[:, 0]], random.normal(0, 0.06, (contacts, 3)), random.normal(size=(contacts, 3)), grains.ids[pairs],
-        {"liquid_volume": random.uniform(size=contacts)},
-    )  # fmt: skip
+    frame = ContactFrame(7, grains.wrapped[pairs[:, 0]], random.normal(0, 0.06, (contacts, 3)), random.normal(size=(contacts, 3)),
+                         grains.ids[pairs], {"liquid_volume": random.uniform(size=contacts)})
     return grains, frame
 
 

@@ -18,8 +18,6 @@ from dembark.postproc import ContactFrame
 from dembark.postproc.fields.cells import cell_totals
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
-from dembark.postproc.walls import CylinderWall, Inclusion, PlaneWall
-from dembark.postproc.walls.patches import box_patches, cylinder_patches, inclusion_patches, plane_patches
 from dembark.validation.cli import main
 
 PLACES = np.array([[0.1, 0.1, 0.1], [0.12, 0.1, 0.1], [0.1, 0.13, 0.1], [0.1, 0.1, 0.14]])
@@ -278,30 +276,6 @@ def test_patches_that_do_not_fit_are_refused_in_one_line(here, capsys, small, op
     assert main(["walls", "g.dump", "--contacts", "c.dump", "--out", "w.nc", *options]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and message in error and not (here / "w.nc").exists()
-
-
-GRAINS = grain_frame(PLACES, radii=0.01, high=(1.0,) * 3)
-PERIODIC = grain_frame(PLACES, radii=0.01, high=(1.0,) * 3, periodic=(True,) * 3)
-CALLS = {
-    "grid": lambda: coarse_grain(GRAINS, None, Grid((0, 0, 0), (1, 1, 1), (10000, 10000, 1)), width=0.01),
-    "grid beyond 2^64": lambda: coarse_grain(GRAINS, None, Grid((0, 0, 0), (1, 1, 1), (2**32, 2**32, 2)), width=0.01),
-    "kernel": lambda: coarse_grain(PERIODIC, None, Grid((0, 0, 0), (1, 1, 1), (9, 9, 9), (True,) * 3), width=30.0),
-    "images": lambda: coarse_grain(PERIODIC, None, Grid((0, 0, 0), (1, 1, 1), (9, 9, 9), (True,) * 3), width=300.0, kernel="lucy"),
-    "cells": lambda: cell_totals(GRAINS, None, Grid((0, 0, 0), (1, 1, 1), (10000, 10000, 1))),
-    "spacing": lambda: Grid.around(GRAINS, 1e-30),
-    "margin": lambda: Grid.around(GRAINS, 0.1, math.inf),
-    "plane": lambda: plane_patches(PlaneWall("a"), np.linspace(0, 1, 10000), np.linspace(0, 1, 10000)),
-    "cylinder": lambda: cylinder_patches(CylinderWall("a", 1.0), 10**10, np.array([0.0, 1.0])),
-    "sphere": lambda: inclusion_patches(Inclusion("a", (1,)), 1.0, 10, 10**10),
-    "box": lambda: box_patches(PlaneWall("a"), GRAINS, 1e-320),
-}
-
-
-@pytest.mark.parametrize("name", CALLS)
-def test_functions_refuse_what_does_not_fit(small, name):
-    with pytest.raises(DembarkError, match=r"of memory|larger ones|margin|more than") as caught:
-        CALLS[name]()
-    assert "\n" not in str(caught.value)
 
 
 def test_more_threads_than_can_be_started_do_no_harm(here):

@@ -191,9 +191,8 @@ def test_moving_a_grain_by_an_edge_of_a_triclinic_box_changes_nothing():
     grains, contacts = random_frame(9, periodic=(True,) * 3, tilt=(0.3, -0.2, 0.45))
     grid = Grid((0, 0, 0), (1, 1, 1), (4, 5, 6), (True,) * 3)
     for edge in ([1.0, 0.0, 0.0], [0.3, 1.0, 0.0], [-0.2, 0.45, 1.0]):
-        moved = grain_frame(
-            grains.wrapped + edge, radii=grains.radii, masses=grains.masses, periodic=(True,) * 3, tilt=(0.3, -0.2, 0.45), omegas=None
-        )
+        moved = grain_frame(grains.wrapped + edge, radii=grains.radii, masses=grains.masses, periodic=(True,) * 3, tilt=(0.3, -0.2, 0.45),
+                            omegas=None)
         other = ContactFrame(7, contacts.first - edge, contacts.branch, contacts.forces, contacts.ids)
         here, there = coarse_grain(grains, contacts, grid, width=0.2), coarse_grain(moved, other, grid, width=0.2)
         np.testing.assert_allclose(here.grains[..., 0], there.grains[..., 0], atol=1e-13)

@@ -11,13 +11,8 @@ from hypothesis import strategies as st
 from dembark.postproc.convergence import SAFETY, SAFETY_UNSEEN_ORDER, convergence, observed_order, refinement
 
 
-@given(
-    st.floats(0.3, 4.0),
-    st.floats(-3.0, 3.0).filter(lambda a: abs(a) > 1e-2),
-    st.floats(1.2, 3.0),
-    st.floats(1.2, 3.0),
-    st.floats(-5.0, 5.0),
-)
+@given(st.floats(0.3, 4.0), st.floats(-3.0, 3.0).filter(lambda a: abs(a) > 1e-2), st.floats(1.2, 3.0), st.floats(1.2, 3.0),
+       st.floats(-5.0, 5.0))
 def test_an_error_of_one_power_is_found_exactly(order: float, factor: float, one: float, two: float, limit: float) -> None:
     h = [0.1, 0.1 * one, 0.1 * one * two]
     values = [limit + factor * size**order for size in h]

@@ -218,14 +218,11 @@ def test_frames_out_of_order_are_sorted(write):
 
 @pytest.mark.parametrize(
     ("rows", "message"),
-    [
-        ([(1, 2, 3), (2, "nan", 3)], r"frame 2, line 23: column x holds a number that is not finite, 'nan'"),
-        ([(1, 2, 3), (2, 5, "-inf")], r"line 23: column y holds a number that is not finite, '-inf'"),
-        ([(1, "Fe", 3)], r"line 22: column x holds no number, 'Fe'"),
-        ([(1, 2, 3), (1, 2)], r"line 23: a line does not hold 3 numbers but 2"),
-        ([(1, 2, 3), (1, 2, 3, 4)], r"line 23: a line does not hold 3 numbers but 4"),
-        ([(1, 2, 3), ()], r"line 23: a line does not hold 3 numbers but 0"),
-    ],
+    [([(1, 2, 3), (2, "nan", 3)], r"frame 2, line 23: column x holds a number that is not finite, 'nan'"),
+     ([(1, 2, 3), (2, 5, "-inf")], r"line 23: column y holds a number that is not finite, '-inf'"),
+     ([(1, "Fe", 3)], r"line 22: column x holds no number, 'Fe'"), ([(1, 2, 3), (1, 2)], r"line 23: a line does not hold 3 numbers but 2"),
+     ([(1, 2, 3), (1, 2, 3, 4)], r"line 23: a line does not hold 3 numbers but 4"),
+     ([(1, 2, 3), ()], r"line 23: a line does not hold 3 numbers but 0")],
 )
 @pytest.mark.parametrize("stream", [False, True])
 def test_what_cannot_be_read_is_told_with_its_line(write, rows, message, stream):
@@ -237,15 +234,13 @@ def test_what_cannot_be_read_is_told_with_its_line(write, rows, message, stream)
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [
-        (plain(0) + "7\n" + plain(10), "line 13: frame 1 has more than its 3 lines"),
-        (frame(0, [(1, 2, 3)] * 4, count=3), "frame 1 has more than its 3 lines"),
-        (plain(0).replace("ITEM: TIMESTEP\n0\n", "ITEM: TIMESTEP\nzero\n"), "frame 1: header cannot be read"),
-        (plain(0).replace("0 2", "0 two"), "frame 1: header cannot be read"),
-        (plain(0).replace("-1 1\n", "-1 nan\n"), "frame 1: header cannot be read"),
-        (plain(0).replace("\n3\n", "\n-3\n"), "frame 1: header cannot be read"),
-        (plain(0).replace("BOX BOUNDS", "BOX SIZE"), "frame 1: header cannot be read"),
-    ],
+    [(plain(0) + "7\n" + plain(10), "line 13: frame 1 has more than its 3 lines"),
+     (frame(0, [(1, 2, 3)] * 4, count=3), "frame 1 has more than its 3 lines"),
+     (plain(0).replace("ITEM: TIMESTEP\n0\n", "ITEM: TIMESTEP\nzero\n"), "frame 1: header cannot be read"),
+     (plain(0).replace("0 2", "0 two"), "frame 1: header cannot be read"),
+     (plain(0).replace("-1 1\n", "-1 nan\n"), "frame 1: header cannot be read"),
+     (plain(0).replace("\n3\n", "\n-3\n"), "frame 1: header cannot be read"),
+     (plain(0).replace("BOX BOUNDS", "BOX SIZE"), "frame 1: header cannot be read")],
 )
 def test_foreign_text_is_refused(write, text, message):
     with pytest.raises(DumpError, match=message):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from dumps import contacts_text, grains_text, write_times
 
-from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times, universe
+from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times
 
 PLACES = np.array([[0.01, 0.02, 0.03], [-0.04, 0.05, 0.123456789012], [0.07, -0.08, 0.09]])
 RADII = np.array([0.0025, 0.002, 0.003])
@@ -15,20 +15,12 @@ def two_frames(tmp_path):
     path = tmp_path / "grains.dump"
     wall = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0], [-4.0, 0.0, 0.5]])
     box = ((0.0, 0.1), (-0.1, 0.1), (0.0, 1.0))
-    text = grains_text(
-        100, PLACES, RADII, velocities=2.0 * PLACES, walls={"side": wall, "base": 0.0 * wall}, box=box, flags="ff pp ff", order=[2, 0, 1]
-    )
+    text = grains_text(100, PLACES, RADII, velocities=2.0 * PLACES, walls={"side": wall, "base": 0.0 * wall}, box=box, flags="ff pp ff",
+                       order=[2, 0, 1])
     path.write_text(
         text
-        + grains_text(
-            200,
-            PLACES + 0.01,
-            RADII,
-            walls={"side": wall, "base": 0.0 * wall},
-            images=[[0, 1, 0], [0, 0, 0], [1, 0, 0]],
-            box=box,
-            flags="ff pp ff",
-        )
+        + grains_text(200, PLACES + 0.01, RADII, walls={"side": wall, "base": 0.0 * wall}, images=[[0, 1, 0], [0, 0, 0], [1, 0, 0]],
+                      box=box, flags="ff pp ff")
     )
     return path
 
@@ -55,23 +47,6 @@ def test_select_keeps_wall_forces_beside_their_grains(two_frames):
     assert part.wall_forces["side"].tolist() == [[-4.0, 0.0, 0.5]]
 
 
-@pytest.mark.parametrize("cut", [1, 30, 200])
-def test_cut_off_last_frame_is_told_or_left_out(two_frames, cut):
-    two_frames.write_bytes(two_frames.read_bytes()[:-cut])
-    with pytest.raises(DumpError, match=r"frame 2: truncated") as caught:
-        GrainsDump(two_frames)
-    assert "\n" not in str(caught.value)
-    dump = GrainsDump(two_frames, skip_truncated=True)
-    assert len(dump) == 1
-    assert "frame 2" in dump.truncated
-
-
-def test_whole_file_is_not_called_truncated(two_frames):
-    dump = GrainsDump(two_frames, skip_truncated=True)
-    assert len(dump) == 2
-    assert dump.truncated == ""
-
-
 @pytest.mark.parametrize(("text", "message"), [("", "empty"), ("hello\n", "does not begin"), (None, "does not exist")])
 def test_foreign_files_are_refused(tmp_path, text, message):
     path = tmp_path / "grains.dump"
@@ -79,30 +54,6 @@ def test_foreign_files_are_refused(tmp_path, text, message):
         path.write_text(text)
     with pytest.raises(DumpError, match=message):
         GrainsDump(path)
-
-
-def test_numbers_that_are_not_finite_are_refused(two_frames):
-    two_frames.write_text(two_frames.read_text().replace("0.07 -0.08", "nan -0.08"))
-    with pytest.raises(DumpError, match="not finite"):
-        GrainsDump(two_frames)[0]
-
-
-def test_missing_column_is_named(tmp_path):
-    path = tmp_path / "grains.dump"
-    path.write_text(grains_text(1, PLACES, RADII).replace(" radius ", " r "))
-    with pytest.raises(DumpError, match="radius is missing"):
-        GrainsDump(path)[0]
-
-
-def test_mdanalysis_sees_the_same_grains(two_frames):
-    world = universe(two_frames, time_step=1e-3)
-    assert world.trajectory.n_frames == 2
-    np.testing.assert_allclose(world.atoms.radii, RADII)
-    assert world.select_atoms("prop z > 0.1").ids.tolist() == [2]
-    times = [(step.time, step.data["frame"].step) for step in world.trajectory]
-    assert times == [(0.1, 100), (0.2, 200)]
-    world.trajectory[0]
-    np.testing.assert_allclose(world.atoms.positions, PLACES, atol=1e-8)
 
 
 def test_contacts_take_the_nearest_image(tmp_path):

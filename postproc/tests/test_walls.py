@@ -51,33 +51,6 @@ def write_stl(path, triangles, binary):
 
 # --- triangles -----------------------------------------------------------------------------------------------------------
 
-def distances_of_all(points, triangles):
-    """Distances (k, t) of k points from each of t triangles: to the plane where the foot lies inside, else to the nearest edge."""
-    first, normals = triangles[:, 0], np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    lengths, found = np.linalg.norm(normals, axis=1), np.full((len(points), len(triangles)), np.inf)
-    inside = np.ones_like(found, bool)
-    for corner in range(3):
-        start, edge = triangles[:, corner], triangles[:, (corner + 1) % 3] - triangles[:, corner]
-        offset = points[:, None] - start
-        along = np.clip((offset * edge).sum(axis=2) / (edge**2).sum(axis=1), 0.0, 1.0)
-        found = np.minimum(found, np.linalg.norm(offset - along[:, :, None] * edge, axis=2))
-        inside &= (np.cross(edge, offset) * normals).sum(axis=2) >= 0.0
-    return np.where(inside, np.abs(((points[:, None] - first) * normals).sum(axis=2)) / lengths, found)
-
-
-@settings(max_examples=40)
-@given(st.integers(0, 10**6), st.integers(1, 300))
-def test_tree_finds_what_comparing_all_triangles_finds(seed, count):
-    random = np.random.default_rng(seed)
-    sizes = 10.0 ** random.uniform(-3, 0.5, (count, 1, 1))
-    triangles = random.uniform(-1.0, 1.0, (count, 1, 3)) + sizes * random.normal(size=(count, 3, 3))
-    points = random.uniform(-2.0, 2.0, (40, 3))
-    found, which = nearest(surface_of(triangles), points)
-    every = distances_of_all(points, triangles)
-    np.testing.assert_allclose(np.linalg.norm(found - points, axis=1), every.min(axis=1), rtol=0, atol=1e-11)
-    np.testing.assert_allclose(every[np.arange(40), which], every.min(axis=1), rtol=0, atol=1e-11)
-
-
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_tree_of_a_flat_mesh_and_points_far_from_it(axis):
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -109,17 +82,6 @@ def test_solids_of_a_text_file_are_groups(tmp_path):
     assert patches.labels == ("part one", "part two")
     np.testing.assert_allclose(patches.areas[0], patches.areas[1])
     np.testing.assert_allclose(patches.centres, [[0.0] * 3, [4.0] * 3], atol=1e-7)
-
-
-@pytest.mark.parametrize("binary", [False, True])
-def test_triangles_given_again_do_not_count_again(tmp_path, binary):
-    """In any order of their corners, and off by less than the precision of the engines: areas and stresses are those of the mesh."""
-    mesh = sphere_mesh(rings=4)
-    again = np.concatenate([mesh, np.roll(mesh, 1, axis=1), mesh[:, ::-1], mesh[:3] + 3e-7])
-    write_stl(tmp_path / "part.stl", again, binary)
-    write_stl(tmp_path / "plain.stl", mesh, binary)
-    plain = MeshWall.from_stl("side", tmp_path / "plain.stl", scale=1e-3)
-    np.testing.assert_array_equal(MeshWall.from_stl("side", tmp_path / "part.stl", scale=1e-3).triangles, plain.triangles)
 
 
 @pytest.mark.parametrize("binary", [False, True])
@@ -195,17 +157,6 @@ def test_pressure_on_a_mesh_is_that_of_each_triangle_and_of_the_whole():
         assert found.patches.locate(np.array([[3.0, 0.0]])).tolist() == [3]
         groups = wall_stress([frame], wall, mesh_patches(wall, "group"))
         np.testing.assert_allclose(groups.mean[:, 0], 4.0)
-
-
-def test_mesh_cylinder_and_plane_agree_where_they_are_the_same():
-    corner = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
-    mesh, plane = MeshWall("floor", corner[[[0, 1, 2], [0, 2, 3]]]), PlaneWall("floor")
-    centres = np.column_stack([RANDOM.uniform(-0.99, 0.99, (50, 2)), np.full(50, 0.09)])
-    frame = frame_of(centres, walls={"floor": RANDOM.normal(size=(50, 3))})
-    one = wall_stress([frame], mesh, mesh_patches(mesh))
-    other = wall_stress([frame], plane, plane_patches(plane, np.array([-1.0, 1.0]), np.array([-1.0, 1.0])))
-    np.testing.assert_allclose((one.mean * one.patches.areas[:, None]).sum(axis=0), (other.mean * other.patches.areas[:, None]).sum(axis=0))
-    np.testing.assert_array_equal(one.force, other.force)
 
 
 def test_forces_outside_the_patches_are_kept_and_told():
@@ -357,23 +308,6 @@ def test_blocks_have_the_interval_of_their_means(count):
     means = values[: blocks.count * length].reshape(blocks.count, length, 3, 2).mean(axis=1)
     due = [[block_mean(means[:, one, other]).half for other in range(2)] for one in range(3)]
     np.testing.assert_allclose(blocks.half((3, 2)), due)
-
-
-@pytest.mark.parametrize("tau", [1.0, 5.0, 40.0])
-def test_intervals_of_patches_hold_the_mean_of_correlated_series(tau):
-    """Autoregressive series of 50 correlation times: 95 % intervals hold the true mean as often as those of `block_mean`."""
-    memory, generator, count = (tau - 1.0) / (tau + 1.0), np.random.default_rng(3), int(50 * max(tau, 4.0))
-    value, blocks, total = generator.normal(size=1000), Blocks(), np.zeros(1000)
-    for _ in range(count):
-        value = memory * value + np.sqrt(1.0 - memory**2) * generator.normal(size=1000)
-        blocks.add(value)
-        total += value
-    held = np.abs(total / count) <= blocks.half((1000,))
-    assert 0.92 < held.mean() < 0.985
-    # As if neighbouring blocks were independent, with all of them.
-    means = np.array(blocks._sums[: blocks.count]) / blocks._length
-    naive = 2.0 * means.std(axis=0, ddof=1) / np.sqrt(blocks.count)
-    assert tau < 10.0 or (np.abs(total / count) <= naive).mean() < 0.85
 
 
 def test_series_gives_the_mean_the_deviation_and_the_peaks():

@@ -8,7 +8,7 @@ from scipy.special import erf
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
 from dembark.postproc.fields.kernels import CUTOFF
-from dembark.postproc.fields.rings import Fields, Rings
+from dembark.postproc.fields.rings import Rings, RingSums
 from dembark.postproc.fields.rings import coarse_grain as ring_fields
 
 from . import scenes
@@ -56,7 +56,7 @@ def _centred(network: Network) -> Network:
                    type(base)(base.points - shift, base.positions - shift, base.forces))
 
 
-def _against_cubes(network: Network, cells: Rings, fields: Fields, spacing: float) -> float:
+def _against_cubes(network: Network, cells: Rings, fields: RingSums, spacing: float) -> float:
     half, low = 1.2, -0.6
     across, up = int(np.ceil(2.0 * half / spacing)), int(np.ceil(2.2 / spacing))
     grid = Grid(np.array([-half, -half, low]), np.array([half, half, low + up * spacing]), (across, across, up))
