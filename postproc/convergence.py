@@ -1,5 +1,5 @@
 """Numerical uncertainty from runs that differ only in the time step, the stiffness or the like: Richardson extrapolation and the grid
-convergence index, told apart from the scatter that packings have anyway.
+convergence index, as distinct from the scatter that packings have anyway.
 
 Roache, J. Fluids Eng. 116 (1994) 405; the procedure for unequal refinement is that of Celik et al., J. Fluids Eng. 130 (2008) 078001;
 which order and safety factor count is decided as by Oberkampf & Roy, Verification and Validation in Scientific Computing (Cambridge 2010),

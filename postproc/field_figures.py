@@ -82,7 +82,7 @@ def image(axes: Any, values: Array, extent: tuple[float, float, float, float], s
 
 
 def bar(figure: Figure, axes: Any, scale: tuple[float, float], paint: str, label: str, **place: Any) -> None:
-    """A colour scale beside or below `axes`."""
+    """A colour scale next to or below `axes`."""
     one = figure.colorbar(ScalarMappable(Normalize(*scale), paint), ax=axes, extend="both", **place)
     one.set_label(label, fontsize=7)
     one.ax.tick_params(labelsize=6.5, width=0.5, length=2.0)

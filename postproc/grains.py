@@ -29,7 +29,7 @@ _SHAPE = ("shape", "blockiness", "c_shape")  # columns of superquadrics and elli
 
 
 class AbsentColumnError(DumpError, AttributeError):
-    """A quantity was asked for that the dump does not hold."""
+    """The dump does not hold a quantity that is needed."""
 
 
 class _Held(Generic[Column]):

@@ -1,4 +1,4 @@
-"""`time.csv`: kinetic energy and wall forces over the whole run, and when a series reaches a level."""
+"""`time.csv`: kinetic energy and wall forces over the complete run, and when a series reaches a level."""
 
 from __future__ import annotations
 

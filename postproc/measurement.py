@@ -41,7 +41,7 @@ class Value:
     scale : what the declared agreement of engines is multiplied with, in the unit of the value
     reason : why the quantity cannot be decided
     inapplicable : why the reference does not hold for this set-up: the deviation is shown, and nothing is checked
-    verdict : pass or fail by another rule than the tolerance, told in `detail`
+    verdict : pass or fail by another rule than the tolerance, given in `detail`
     compared : False where engines are not compared in it for what was measured
     """
 

@@ -1,6 +1,6 @@
 """Pictures of grains and slices through fields, rendered off screen with PyVista, and short animations of them as GIF.
 
-A renderer may crash for want of graphics libraries: it runs in a process of its own, and its crash is an error in one line.
+A renderer may crash where graphics libraries are missing: it runs in a process of its own, and its crash is an error in one line.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 def volume_below(height: Array, radius: Array) -> Array:
     """Volume (m3) of spheres of `radius` (m) below a plane `height` (m) above their centres; broadcasts.
 
-    Spherical cap, V = pi (r + h)^2 (2r - h) / 3 for -r <= h <= r, continued by 0 and the whole sphere.
+    Spherical cap, V = pi (r + h)^2 (2r - h) / 3 for -r <= h <= r, continued by 0 and the volume of the sphere.
     """
     inside = np.clip(height, -radius, radius)
     return np.pi / 3.0 * (radius + inside) ** 2 * (2.0 * radius - inside)
@@ -23,5 +23,5 @@ def slice_volumes(centres: Array, radii: Array, edges: Array) -> Array:
 
 
 def volume(radii: Array) -> Array:
-    """Volumes (m3) of whole spheres."""
+    """Volumes (m3) of spheres."""
     return 4.0 / 3.0 * np.pi * radii**3

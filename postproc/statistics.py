@@ -119,8 +119,8 @@ def _division(length: int, tau: Array, most: int) -> tuple[NDArray[np.int64], Ar
     blocks = np.minimum(most, length / (_BLOCK_LENGTH * tau)).astype(np.int64)
     single = blocks < _MIN_BLOCKS
     blocks = np.where(single, _MIN_BLOCKS, blocks)
-    whole, part = _variance_of_mean(length, tau), _variance_of_mean(length / blocks, tau)
-    return blocks, np.sqrt(np.where(single, blocks, whole * (blocks - 1) / (part - whole))), single
+    total, part = _variance_of_mean(length, tau), _variance_of_mean(length / blocks, tau)
+    return blocks, np.sqrt(np.where(single, blocks, total * (blocks - 1) / (part - total))), single
 
 
 def _variance_of_mean(count: Array | float, tau: Array) -> Array:

@@ -2,7 +2,7 @@
 
 The field stress of a slab of volume V is the sum over contacts of f_a l_b times the part of the branch vector inside the slab, plus
 the kinetic part, over V (Irving-Kirkwood with a straight line between the centres; as in Goldhirsch, Granular Matter 12 (2010) 239).
-A contact with a wall has the line from the grain's centre to the wall. With it the integral over the whole container equals the
+A contact with a wall has the line from the grain's centre to the wall. With it the integral over the complete container equals the
 moment of the external forces, and the stress at a level equals the force of what is above it on what is below.
 """
 

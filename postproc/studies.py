@@ -1,5 +1,5 @@
 """What studies share: the measured quantities of their points, intervals of what is computed from these, exponents, and the error
-beside a datum."""
+compared with a datum."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def propagated(measure: Callable[[Array], float], values: Array, halves: Array, 
 @dataclass(frozen=True)
 class Comparison:
     """ASME V&V 20: the `error` E = S - D of a simulated value S against the datum D, and U_val, the `uncertainty` that it is known within,
-    the root of the sum of squares of its parts; `text` tells all of them."""
+    the root of the sum of squares of its parts; `text` lists all of them."""
 
     error: float
     uncertainty: float
@@ -51,7 +51,7 @@ class Comparison:
 
 
 def compared(value: float, datum: Estimate, **parts: float) -> Comparison:
-    """S = `value` beside the `datum`, whose half-width is U_D; the other `parts` of U_val by what U is an index of, as num=0.1 for
+    """S = `value` compared with the `datum`, whose half-width is U_D; the other `parts` of U_val by what U is an index of, as num=0.1 for
     U_num."""
     error, every = value - datum.value, {**parts, "D": datum.half}
     joint = math.hypot(*every.values())

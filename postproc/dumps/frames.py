@@ -171,7 +171,7 @@ class Dump(ABC):
         return f"{self.path}, frame {entry.number}"
 
     def _cut_off(self, said: str) -> None:
-        """A frame is not whole: refuse it, or note that it is left out."""
+        """A frame is not complete: refuse it, or note that it is left out."""
         if not self.skip_truncated:
             raise CutOffError(said)
         said = said.replace(f" ({HINT})", "") + "; it was left out"
@@ -214,7 +214,7 @@ class Dump(ABC):
         return (self.frame(number) for number in range(len(self)))
 
     def frame(self, number: int, columns: Sequence[str] | None = None) -> RawFrame:
-        """Frame `number` (from 0) with all columns, or only with these; DumpError when it is not whole, IndexError when there is none."""
+        """Frame `number` (from 0) with all columns, or only with these; DumpError when it is cut off, IndexError when there is none."""
         if not 0 <= number < len(self._entries):
             raise IndexError(number)
         entry = self._entries[number]
@@ -268,23 +268,23 @@ def take(values: Array, columns: Sequence[int]) -> Array:
 
 
 def integers(values: Array, where: str) -> NDArray[np.int64]:
-    """Integers that were read as doubles; DumpError, begun by `where`, for fractions, for numbers beyond 2^53, where doubles do not tell
-    all integers apart, and for those that were written with six digits."""
+    """Integers that were read as doubles; DumpError, begun by `where`, for fractions, for numbers beyond 2^53, where doubles do not
+    distinguish all integers, and for those that were written with six digits."""
     if not values.size:
         return values.astype(np.int64)
     largest = np.abs(values).max()
     if largest > 2.0**53:
-        raise DumpError(f"{where} holds numbers beyond 2^53, which double precision does not tell apart")
-    whole = values.astype(np.int64)
-    if not np.array_equal(whole, values):
-        wrong = values[whole != values][0]
+        raise DumpError(f"{where} holds numbers beyond 2^53, which double precision does not distinguish")
+    exact = values.astype(np.int64)
+    if not np.array_equal(exact, values):
+        wrong = values[exact != values][0]
         raise DumpError(f"{where} holds {wrong:.9g}, which is no integer")
     if largest >= 1e6:
         # %g, the format of `dump local` by default, makes 1234567 to 1.23457e+06.
-        large = whole[np.abs(whole) >= 1e6]
+        large = exact[np.abs(exact) >= 1e6]
         if len(large) > 2 and not (large % 10).any():
             raise DumpError(f"{where} holds large numbers that all end in 0: they were rounded to six digits; set the format of the dump")
-    return whole
+    return exact
 
 
 def cell(low: Array, high: Array, tilt: Array) -> Array:
@@ -302,7 +302,7 @@ def before_tilt(low: Array, high: Array, tilt: Array) -> tuple[Array, Array]:
 
 
 def less_edges(vectors: Array, raw: RawFrame) -> Array:
-    """The vectors (m, 3) less whole edges of the box along its periodic axes: between nearest images."""
+    """The vectors (m, 3) less full edges of the box along its periodic axes: between nearest images."""
     edges, result = cell(raw.low, raw.high, raw.tilt), vectors.copy()
     for axis in (2, 1, 0):
         if raw.periodic[axis]:
@@ -311,7 +311,7 @@ def less_edges(vectors: Array, raw: RawFrame) -> Array:
 
 
 def folded(places: Array, low: Array, high: Array, tilt: Array, periodic: NDArray[np.bool_]) -> Array:
-    """The places (n, 3) moved by whole edges of its periodic axes into the box, which may be tilted."""
+    """The places (n, 3) moved by full edges of its periodic axes into the box, which may be tilted."""
     if not periodic.any():
         return places
     edges = cell(low, high, tilt)

@@ -58,7 +58,7 @@ class SeriesDump(Dump):
                 yield Entry(0, 1, 0, 1, -1, 0, f"empty ({HINT})", number)
                 continue
             for entry in one._find():
-                # Only by reading it all is it known that a file of VTK is whole.
+                # Only reading all of it shows whether a file of VTK is complete.
                 unknown = entry.count < 0 and not entry.fault and number == len(self._files) - 1
                 steps.append(entry.step)
                 yield replace(entry, file=number, fault=_fault(one, entry) if unknown else entry.fault)

@@ -154,7 +154,7 @@ class Window:
         return read > 0
 
     def _line_end(self) -> int:
-        """Where in `data` the next whole line ends, or -1 when there is none any more."""
+        """Where in `data` the next complete line ends, or -1 when there is none any more."""
         looked = 0
         while (found := self._text.find(b"\n", self.begin + looked, self.end)) < 0:
             looked = self.end - self.begin
@@ -163,7 +163,7 @@ class Window:
         return found
 
     def line(self) -> bytes | None:
-        """The next whole line without its end, or None when there is none any more."""
+        """The next complete line without its end, or None when there is none any more."""
         found = self._line_end()
         if found < 0:
             return None

@@ -39,7 +39,7 @@ class Grid:
             raise DembarkError(f"grid from {self.low} to {self.high} m", "its corners", "give three finite coordinates each, low < high")
         shape = tuple(int(count) for count in self.shape)
         if len(shape) != 3 or min(shape) < 1 or any(count != given for count, given in zip(shape, self.shape, strict=True)):
-            raise DembarkError(f"grid of {self.shape} cells", "its shape", "give three whole numbers of at least 1")
+            raise DembarkError(f"grid of {self.shape} cells", "its shape", "give three integers of at least 1")
         low.flags.writeable = high.flags.writeable = False
         for name, value in (("low", low), ("high", high), ("shape", shape), ("periodic", tuple(bool(flag) for flag in self.periodic))):
             object.__setattr__(self, name, value)

@@ -280,7 +280,7 @@ class _Sources:
 
 def _points(first: Array, branch: Array, forces: Array, width: float) -> tuple[Array, Array]:
     """Places (m, 3) of Gauss's rule on all lines, and there the lines' -f l (m, 3, 3) in J by the weights of the rule."""
-    # Each line as finely as its own length asks for: one long line must not make many points of all.
+    # Each line as finely as its own length requires: one long line must not make many points of all.
     counts = np.maximum(_POINTS, np.rint(_POINTS * np.sqrt((branch**2).sum(axis=1)) / width).astype(int))
     places, tensors = [np.empty((0, 3))], [np.empty((0, 3, 3))]
     for count in np.unique(counts):

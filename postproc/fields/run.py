@@ -105,7 +105,7 @@ class FieldAverages:
         return joined(found)
 
     def _kept(self, data: xarray.Dataset) -> xarray.Dataset:
-        """The fields that were asked for; DembarkError for one that the frames do not give."""
+        """The chosen fields; DembarkError for one that the frames do not give."""
         for name in self.only:
             if name not in data:
                 there = ", ".join(str(one) for one in data if not str(one).endswith("_bounds"))

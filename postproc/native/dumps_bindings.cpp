@@ -79,7 +79,7 @@ nb::tuple read_stl(const std::string& path, double precision) {
 NB_MODULE(_dumps, module) {
   module.doc() = "Lines of text dumps, and STL files, as arrays.";
   module.def("skip", &skip, "text"_a, "begin"_a, "end"_a, "lines"_a,
-             "Pass over whole lines; (position, lines, fault, column).");
+             "Pass over complete lines; (position, lines, fault, column).");
   module.def("parse", &parse, "text"_a, "begin"_a, "end"_a, "place"_a, "values"_a, "row"_a, "threads"_a = 0,
              "Fill rows of `values` from `row` on; (position, rows, fault, column) with the fault of the row after them, or 0.");
   module.def("read_stl", &read_stl, "path"_a, "precision"_a,

@@ -58,7 +58,7 @@ Fault parse_line(const char*& p, const char* end, const std::vector<int>& place,
   return Fault::none;
 }
 
-// [begin, end) consists of whole lines.
+// [begin, end) consists of complete lines.
 Rows parse_part(const char* begin, const char* end, std::size_t lines, const std::vector<int>& place, std::size_t width, double* values) {
   Rows read{begin, 0, Fault::none, 0};
   for (; read.rows < lines && read.position < end; ++read.rows) {

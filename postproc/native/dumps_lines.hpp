@@ -16,10 +16,10 @@ struct Rows {
   std::size_t column;    // where it is, from 0
 };
 
-// How far `lines` whole lines reach from `begin`, none of them beginning a frame.
+// How far `lines` complete lines reach from `begin`, none of them beginning a frame.
 Rows skip_lines(const char* begin, const char* end, std::size_t lines);
 
-// At most `lines` whole lines as rows of `width` numbers from `values` on. Column c of the text goes to place[c], or nowhere when that
+// At most `lines` complete lines as rows of `width` numbers from `values` on. Column c of the text goes to place[c], or nowhere when that
 // is negative. The result does not depend on the number of threads.
 Rows parse_lines(const char* begin, const char* end, std::size_t lines, const std::vector<int>& place, std::size_t width, double* values,
                  std::size_t threads);

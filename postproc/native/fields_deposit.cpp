@@ -72,7 +72,7 @@ class Worker {
   // The order in which the records of a shaft are taken: by where along z their windows begin, then by where along y they end and begin,
   // so that those that reach a row of cells lie close together; ties in the order of the lines.
   void sort(std::size_t shaft) {
-    constexpr int ends = 4;  // ends of windows along y that are told apart
+    constexpr int ends = 4;  // ends of windows along y that are distinguished
     records_ = shafts_.records.get() + shafts_.begin[shaft];
     const std::size_t count = std::size_t(shafts_.begin[shaft + 1] - shafts_.begin[shaft]);
     const int height = shafts_.block[1], kinds = ends * height, last = shafts_.most[1] + height - ends;
@@ -105,7 +105,7 @@ class Worker {
       __builtin_prefetch(&record);
       __builtin_prefetch(reinterpret_cast<const char*>(&record + 1) - 1);
     });
-    ahead(max_group, [&](const Record<Source>& record) { source_.prefetch(record.carried); });
+    ahead(max_group, [&](const Record<Source>& record) { source_.prefetch(record.contribution); });
     int stop[3] = {0, 0, 0};
     for (int line = 0; line < group.count; ++line) {
       const std::int64_t n = order_[std::size_t(begin + line)];

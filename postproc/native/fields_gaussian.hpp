@@ -62,7 +62,7 @@ inline void plane_rows(const Factors& factors, const Nodes& nodes, const Group& 
   }
 }
 
-// A part of a row of cells: `cells` <= LANES of them, columns `depth` apart. `room`: a whole pack may be stored, whose lanes beyond hold
+// A part of a row of cells: `cells` <= LANES of them, columns `depth` apart. `room`: a complete pack may be stored, whose lanes beyond hold
 // zeros.
 struct Row {
   int cells;

@@ -27,7 +27,7 @@ struct Segment {
   double first[3], branch[3];
 };
 
-// `place` shifted by whole edges of the box.
+// `place` shifted by full edges of the box.
 template <class Place>
 Place shifted(Place place, const Box& box, const int edges[3]) {
   if (edges[0] == 0 && edges[1] == 0 && edges[2] == 0) return place;
@@ -41,8 +41,8 @@ Place shifted(Place place, const Box& box, const int edges[3]) {
 
 // std::floor is a call where the processor is not known to have an instruction for it.
 inline double whole_below(double value) {
-  const double whole = double(std::int64_t(value));
-  return whole > value ? whole - 1.0 : whole;
+  const double truncated = double(std::int64_t(value));
+  return truncated > value ? truncated - 1.0 : truncated;
 }
 
 template <class Place>
@@ -53,7 +53,7 @@ Window window_of(const Cells& cells, const Kernel& kernel, const Place& place) {
     const double count = cells.shape[axis];
     double start = (std::min(a, b) - kernel.reach - cells.low[axis]) * cells.per_metre[axis];
     double stop = (std::max(a, b) + kernel.reach - cells.low[axis]) * cells.per_metre[axis];
-    // A factor of each axis needs no cells outside the grid; a spherical kernel is normalised over the whole ball.
+    // A factor of each axis needs no cells outside the grid; a spherical kernel is normalised over the complete ball.
     if (kernel.kind == KernelKind::gaussian) {
       start = std::clamp(start, 0.0, count - 1.0);
       stop = std::clamp(stop, 1.0, count);
@@ -66,7 +66,7 @@ Window window_of(const Cells& cells, const Kernel& kernel, const Place& place) {
   return window;
 }
 
-// Calls `take(edges)` for all images of `place`, shifted by whole edges of the box, that come within the kernel's reach of the cells.
+// Calls `take(edges)` for all images of `place`, shifted by full edges of the box, that come within the kernel's reach of the cells.
 template <class Place, class Take>
 void for_images(const Cells& cells, const Box& box, const Kernel& kernel, const Place& place, const Take& take) {
   int from[3], to[3], edges[3] = {0, 0, 0};

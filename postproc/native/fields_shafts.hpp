@@ -15,7 +15,7 @@ namespace dembark::fields {
 template <class Source>
 struct Record {
   typename Source::Place place;
-  typename Source::Carried carried;
+  typename Source::Contribution contribution;
 };
 
 // All images that come within the kernel's reach of the cells. Those whose windows begin in the same block[0] x block[1] cells across x
@@ -70,7 +70,7 @@ Counts count_windows(const Cells& cells, const Box& box, const Kernel& kernel, c
 
 // Larger blocks give larger groups, which pass the grid less often, but larger windows.
 inline void choose_block(const Cells& cells, std::int64_t count, const int most[3], int block[2]) {
-  constexpr double enough = 32.0;  // lines of a block: passing its part of the grid then costs little beside them
+  constexpr double enough = 32.0;  // lines of a block: passing its part of the grid then costs little compared with them
   double together = double(count) / (double(cells.shape[0]) * cells.shape[1] * cells.shape[2]);
   for (int axis = 1; together < enough && 3 * block[axis] < most[axis]; axis = 1 - axis, together *= 2.0) block[axis] *= 2;
 }
@@ -125,7 +125,7 @@ Shafts<Source> sort_images(const Cells& cells, const Box& box, const Kernel& ker
     std::vector<Placed> some;
     const auto write = [&] {
       for (const Placed& one : some)
-        shafts.records[std::size_t(one.to)] = {shifted(source.place(one.line), box, one.edges), source.carry(one.line)};
+        shafts.records[std::size_t(one.to)] = {shifted(source.place(one.line), box, one.edges), source.contribution(one.line)};
       some.clear();
     };
     const Range range(source.count, n, threads);

@@ -30,14 +30,14 @@ inline Segment segment(const double* first, const double* branch) {
   return {{first[0], first[1], first[2]}, {branch[0], branch[1], branch[2]}};
 }
 
-// Each source knows the place of each of its `count` lines, what of a line has to be carried there to tell its columns (`Carried`), and
+// Each source knows the place of each of its `count` lines, what of a line is needed there to find its columns (`Contribution`), and
 // fills those in. `moved`: what columns become when a place is moved by `shift`.
 
 // Lines from `first` to `first + branch`, (count, 3) each, with any columns.
 struct PlainSource {
   static constexpr bool placed = false;  // whether columns depend on where an image is
   using Place = Segment;
-  struct Carried {
+  struct Contribution {
     std::int32_t line;
   };
   std::int64_t count;
@@ -46,10 +46,10 @@ struct PlainSource {
   const double* values;  // (count, columns)
 
   Place place(std::int64_t n) const { return segment(first + 3 * n, branch + 3 * n); }
-  Carried carry(std::int64_t n) const { return {std::int32_t(n)}; }
-  void prefetch(const Carried& carried) const { __builtin_prefetch(values + std::int64_t(carried.line) * columns); }
+  Contribution contribution(std::int64_t n) const { return {std::int32_t(n)}; }
+  void prefetch(const Contribution& contribution) const { __builtin_prefetch(values + std::int64_t(contribution.line) * columns); }
   void fill(const Record<PlainSource>& record, double* out) const {
-    std::copy_n(values + std::int64_t(record.carried.line) * columns, columns, out);
+    std::copy_n(values + std::int64_t(record.contribution.line) * columns, columns, out);
   }
 };
 
@@ -58,7 +58,7 @@ struct GrainSource {
   static constexpr bool placed = true;
   static constexpr int columns = grain_columns;
   using Place = Point;
-  struct Carried {
+  struct Contribution {
     double mass, radius, velocity[3], peculiar[3], touches, liquid;
   };
   std::int64_t count;
@@ -67,14 +67,14 @@ struct GrainSource {
   double middle[3];
 
   Place place(std::int64_t n) const { return {{places[3 * n], places[3 * n + 1], places[3 * n + 2]}}; }
-  Carried carry(std::int64_t n) const {
+  Contribution contribution(std::int64_t n) const {
     const double *v = velocities + 3 * n, *w = peculiar + 3 * n;
     return {masses[n], radii[n], {v[0], v[1], v[2]}, {w[0], w[1], w[2]}, touches[n], liquid ? liquid[n] : 0.0};
   }
-  void prefetch(const Carried&) const {}
+  void prefetch(const Contribution&) const {}
 
   void fill(const Record<GrainSource>& record, double* out) const {
-    const Carried& grain = record.carried;
+    const Contribution& grain = record.contribution;
     const double mass = grain.mass, *place = record.place.first;
     const double x[3] = {place[0] - middle[0], place[1] - middle[1], place[2] - middle[2]};
     out[0] = mass;
@@ -114,7 +114,7 @@ struct ContactSource {
   static constexpr bool placed = false;
   static constexpr int columns = contact_columns;
   using Place = Segment;
-  struct Carried {
+  struct Contribution {
     double force[3];
     std::int32_t pair[2], line;
     bool touching;
@@ -127,30 +127,30 @@ struct ContactSource {
   const double *liquid, *power;           // (m,) or null
 
   Place place(std::int64_t m) const { return segment(first + 3 * m, branch + 3 * m); }
-  Carried carry(std::int64_t m) const {
+  Contribution contribution(std::int64_t m) const {
     const double* f = forces + 3 * m;
     return {{f[0], f[1], f[2]}, {std::int32_t(pairs[2 * m]), std::int32_t(pairs[2 * m + 1])}, std::int32_t(m), touching[m]};
   }
 
-  void prefetch(const Carried& carried) const {
+  void prefetch(const Contribution& contribution) const {
     if (motions)
-      for (const std::int32_t grain : carried.pair) __builtin_prefetch(motions + grain);
-    if (liquid) __builtin_prefetch(liquid + carried.line);
-    if (power) __builtin_prefetch(power + carried.line);
+      for (const std::int32_t grain : contribution.pair) __builtin_prefetch(motions + grain);
+    if (liquid) __builtin_prefetch(liquid + contribution.line);
+    if (power) __builtin_prefetch(power + contribution.line);
   }
 
   void fill(const Record<ContactSource>& record, double* out) const {
-    const double *l = record.place.branch, *f = record.carried.force;
+    const double *l = record.place.branch, *f = record.contribution.force;
     const double length = std::sqrt(l[0] * l[0] + l[1] * l[1] + l[2] * l[2]), inverse = 1.0 / std::max(length, 1e-300);
-    const double n[3] = {l[0] * inverse, l[1] * inverse, l[2] * inverse}, touches = record.carried.touching ? 1.0 : 0.0;
+    const double n[3] = {l[0] * inverse, l[1] * inverse, l[2] * inverse}, touches = record.contribution.touching ? 1.0 : 0.0;
     product(f, l, -1.0, out);
     symmetric_parts(n, n, touches, out + 9);
     out[15] = touches;
     out[16] = out[17] = 0.0;
-    out[18] = liquid ? liquid[record.carried.line] : 0.0;
+    out[18] = liquid ? liquid[record.contribution.line] : 0.0;
     out[19] = 1.0;
     if (motions) {
-      const Motion &one = motions[record.carried.pair[0]], &two = motions[record.carried.pair[1]];
+      const Motion &one = motions[record.contribution.pair[0]], &two = motions[record.contribution.pair[1]];
       const double half = 0.5 * (one.radius + two.radius - length), arm_one = one.radius - half, arm_two = two.radius - half;
       double spin[3], relative[3];
       for (int i = 0; i < 3; ++i) {
@@ -164,7 +164,7 @@ struct ContactSource {
       out[16] = -dot(f, relative);
       out[17] = out[16] + dot(f, n) * dot(relative, n);
     }
-    if (power) out[16] = power[record.carried.line];
+    if (power) out[16] = power[record.contribution.line];
   }
 };
 

@@ -19,7 +19,7 @@ struct Wide {
 
   template <class Source>
   Wide(const Cells& inner, const Box& around, const Kernel& kernel, const Source& source, int threads) : cells(inner), box(around) {
-    // Across a sheared border the cells do not meet; a spherical kernel is normalised over its window, wherever that is.
+    // Across a sheared border the cells do not fit together; a spherical kernel is normalised over its window, wherever that is.
     const bool sheared = box.edge[1][0] != 0.0 || box.edge[2][0] != 0.0 || box.edge[2][1] != 0.0;
     if (sheared || kernel.kind != KernelKind::gaussian || source.count == 0) return;
     const std::array<double, 3> longest = reach_of_branches(source, threads);

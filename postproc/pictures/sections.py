@@ -41,7 +41,7 @@ class Section:
     `times` (frames,).
 
     `links` (m, 2, 2) are contacts of the last frame with `forces` (m,) in N. `drum_radius` 0: there is no drum. The drum turns by
-    `drum_speed` (rad/s) about the axis across the plane, clockwise when positive. `walls` (frames, k, 2, 2): lines in which meshes meet the
+    `drum_speed` (rad/s) about the axis across the plane, clockwise when positive. `walls` (frames, k, 2, 2): lines where meshes cross the
     plane. The longer side of an animation has so many `pixels`.
     """
 
@@ -103,7 +103,7 @@ def scene(folder: Path, cross_section: str, drum_radius: float = 0.0, drum_speed
 
 
 def _walls(folder: Path, steps: list[int]) -> Array:
-    """Lines (frames, k, 2, 2) in m of x and z in which the meshes of a run meet the plane in the middle of them, at these `steps`, by the
+    """Lines (frames, k, 2, 2) in m of x and z in which the meshes of a run cross the plane in the middle of them, at these `steps`, by the
     columns motion_x, motion_z of its history, or at rest without them; none where they turn."""
     none = np.zeros((0, 0, 2, 2))
     meshes = sorted(folder.glob("*.stl"))

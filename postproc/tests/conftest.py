@@ -1,4 +1,4 @@
-"""Makes the dump writer importable for the tests beside it."""
+"""Makes the dump writer importable for these tests."""
 
 import sys
 from pathlib import Path

@@ -31,7 +31,7 @@ def test_a_mesh_that_is_felt_later_is_looked_at_then(resting_later, capsys, comm
 
 
 def test_a_mesh_of_another_size_than_the_box_is_doubted(run, capsys):  # noqa: F811
-    """A flat wall fits at any size: much larger than the box it is told, smaller than a grain it is refused."""
+    """A flat wall fits at any size: much larger than the box it gets a note, smaller than a grain it is refused."""
     square(run / "base.stl", 40.0)
     wall = "base:mesh:file=run/base.stl:unit="
     assert main(["walls", "run", "--wall", wall + "in", "--out", "w.nc"]) == 0

@@ -1,4 +1,4 @@
-"""Dumps come back as they were written, and broken ones are told in one line."""
+"""Dumps come back as they were written, and broken ones are refused in one line."""
 
 import numpy as np
 import pytest

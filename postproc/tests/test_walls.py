@@ -245,7 +245,7 @@ def test_hydrostatic_pressure_on_a_grain(swap):
 
 
 def test_force_on_an_inclusion_by_height_and_its_sign():
-    # Two glued grains; one neighbour beside the upper one pushes it along -x, one below pushes it up.
+    # Two glued grains; one neighbour next to the upper one pushes it along -x, one below pushes it up.
     positions = [[0.0, 0.0, 0.5], [0.0, 0.0, -0.5], [1.0, 0.0, 0.5], [0.0, 0.0, -1.5]]
     frame = frame_of(positions, 0.5, ids=[3, 5, 8, 9])
     contacts = contacts_of(frame, [3, 9, 3], [8, 5, 5], np.array([[-4.0, 0.0, 1.0], [0.0, 0.0, -2.0], [9.0, 9.0, 9.0]]))

@@ -45,7 +45,7 @@ def read_stl(path: str | Path, precision: float = 0.0) -> Surface:
 
 
 def cut(triangles: Array, place: float = 0.0) -> Array:
-    """Segments (k, 2, 2), of x and z, in which `triangles` (n, 3, 3) meet the plane y = `place`; those that only touch it count not."""
+    """Segments (k, 2, 2), of x and z, in which `triangles` (n, 3, 3) cross the plane y = `place`; those that only touch it do not count."""
     found = []
     for corners in triangles - np.array([0.0, place, 0.0]):
         above = corners[:, 1] > 0.0

@@ -65,7 +65,7 @@ class Patches:
             return self.of_triangle[coordinates[:, 0].astype(np.int64)]
         index, inside = np.zeros(len(coordinates), np.int64), np.ones(len(coordinates), bool)
         for edges, place in zip(self.edges, coordinates.T, strict=True):
-            # The last border belongs to the last patch: round-off makes an angle a whole turn.
+            # The last border belongs to the last patch: round-off makes an angle a full turn.
             bin_of = np.where(place == edges[-1], len(edges) - 2, np.searchsorted(edges, place, side="right") - 1)
             inside &= (bin_of >= 0) & (bin_of < len(edges) - 1)
             index = index * (len(edges) - 1) + bin_of

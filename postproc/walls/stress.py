@@ -36,7 +36,7 @@ class WallStress:
     (p, 3) half-width of the 95 % interval of the mean from `blocks` means over time (inf with fewer than 8), `mean_force` (p, 3) in N along
     x, y, z, `contacts` (p,) number of contacts counted in all frames, `series` (T, p, 3) in Pa when it was kept.
     Histograms: `peak_stress`, local maxima in time of the patches' normal stress (Pa); `contact_force`, normal forces of single contacts
-    (N). Peaks of the whole wall: `peak_times` (s), `peak_forces` (N), local maxima of `normal_force`.
+    (N). Peaks of the complete wall: `peak_times` (s), `peak_forces` (N), local maxima of `normal_force`.
     `reach` (2,): smallest and largest distance of a contact point from its grain's centre over the grain's radius; about 1 when the
     wall is where the grains feel it.
     """
@@ -162,7 +162,7 @@ def wall_stress(frames: Iterable[GrainFrame], wall: Wall | Inclusion, patches: P
     the dump lacks the wall's forces, or contacts and frames do not belong together.
     """
     recorder = WallRecorder(wall, patches, keep_series=keep_series)
-    beside = iter(contacts) if contacts is not None else None
+    touching_frames = iter(contacts) if contacts is not None else None
     for frame in frames:
-        recorder.add(frame, next(beside, None) if beside is not None else None, frame.time_by(time_step))
+        recorder.add(frame, next(touching_frames, None) if touching_frames is not None else None, frame.time_by(time_step))
     return recorder.result()
