@@ -14,15 +14,30 @@ FREE = (False, False, False)
 
 
 def grain_frame(positions: Any, *, radii: Any = 0.5, masses: Any = 1.0, velocities: Any = 0.0, omegas: Any = 0.0, low: Any = (0, 0, 0),
-                high: Any = (1, 1, 1), periodic: Any = FREE, tilt: Any = (0, 0, 0), extra: Any = None) -> GrainFrame:
+                high: Any = (1, 1, 1), periodic: Any = FREE, tilt: Any = (0, 0, 0), extra: Any = None, step: int = 7, walls: Any = None,
+                ids: Any = None) -> GrainFrame:
     """A frame of n grains; numbers stand for all of them."""
     positions = np.asarray(positions, float).reshape(-1, 3)
     count = len(positions)
-    return GrainFrame(step=7, low=np.asarray(low, float), high=np.asarray(high, float), periodic=np.asarray(periodic, bool),
-                      ids=np.arange(1, count + 1), types=np.ones(count, int), positions=positions, wrapped=positions,
-                      velocities=np.zeros((count, 3)) + velocities, omegas=None if omegas is None else np.zeros((count, 3)) + omegas,
-                      forces=np.zeros((count, 3)), radii=np.zeros(count) + radii, masses=np.zeros(count) + masses, wall_forces={},
-                      tilt=np.asarray(tilt, float), extra=extra or {})
+    return GrainFrame(
+        step=step, low=np.asarray(low, float), high=np.asarray(high, float), periodic=np.asarray(periodic, bool),
+        ids=np.arange(1, count + 1) if ids is None else np.asarray(ids), types=np.ones(count, int), positions=positions, wrapped=positions,
+        velocities=np.zeros((count, 3)) + velocities, omegas=None if omegas is None else np.zeros((count, 3)) + omegas,
+        forces=np.zeros((count, 3)), radii=np.zeros(count) + radii, masses=np.zeros(count) + masses,
+        wall_forces={name: np.asarray(force, float).reshape(-1, 3) for name, force in (walls or {}).items()}, tilt=np.asarray(tilt, float),
+        extra=extra or {})
+
+
+def frame_of(positions: Any, radii: Any = 0.1, walls: Any = None, **how: Any) -> GrainFrame:
+    """Resting grains of mass 1 with given wall forces, in a box of 10 m."""
+    return grain_frame(positions, radii=radii, walls=walls, **{"step": 0, "low": (-5.0,) * 3, "high": (5.0,) * 3} | how)
+
+
+def contacts_of(frame: GrainFrame, first: Any, second: Any, forces: Any) -> ContactFrame:
+    """Contacts between grains by their ids, with the forces on the first."""
+    rows = np.searchsorted(frame.ids, np.column_stack([first, second]))
+    start, end = frame.positions[rows.T]
+    return ContactFrame(frame.step, start, end - start, np.asarray(forces, float), frame.ids[rows])
 
 
 def contact_frame(grains: GrainFrame, pairs: Any, forces: Any, extra: Any = None) -> ContactFrame:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista
 import xarray
-from scenes import frame_of
+from packings import frame_of
 
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc.fields.coarse_graining import coarse_grain

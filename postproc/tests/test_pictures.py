@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from packings import contacts_of, frame_of
 from PIL import Image
-from scenes import contacts_of, frame_of
 
 from dembark.common.errors import DembarkError, RunError
 from dembark.postproc import plots, render

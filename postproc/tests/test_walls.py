@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scenes import contacts_of, frame_of
+from packings import contacts_of, frame_of
 
 from dembark.common.errors import DembarkError
 from dembark.postproc import DumpError
