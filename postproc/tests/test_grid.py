@@ -41,7 +41,7 @@ def test_images_of_a_triclinic_box_tile_space():
 @pytest.mark.parametrize(
     ("low", "high", "shape", "match"),
     [((0, 0, 0), (1, 1, 0), (1, 1, 1), "low < high"), ((0, 0, np.nan), (1, 1, 1), (1, 1, 1), "finite"),
-     ((0, 0, 0), (1, 1, 1), (1, 0, 1), "at least 1"), ((0, 0, 0), (1, 1, 1), (1, 1.5, 1), "whole numbers")],
+     ((0, 0, 0), (1, 1, 1), (1, 0, 1), "at least 1"), ((0, 0, 0), (1, 1, 1), (1, 1.5, 1), "three integers")],
 )
 def test_wrong_grids_are_refused(low, high, shape, match):
     with pytest.raises(DembarkError, match=match):
