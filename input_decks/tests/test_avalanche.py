@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.common.errors import DembarkError
 from dembark.input_decks.avalanche.slope_flow import Slope, front_law, mean_power, profile_power
 from dembark.input_decks.common.momentum import imbalance
 from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names, point
@@ -187,13 +186,6 @@ def test_the_power_of_a_profile_that_changes_has_an_interval(seeds: int) -> None
     assert held >= 0.86 * seeds
     assert np.mean(halves) == pytest.approx(2.26 * 0.3 / math.sqrt(80.0), rel=0.25)
     assert mean_power(z, np.ones((6, 15)), np.tile(1.0 - (1.0 - z) ** 1.5, (6, 1))).half >= 0.0
-
-
-@pytest.mark.parametrize(("changes", "said"), [({"gate_place": 95.0}, "upper end"), ({"gate_place": 2.0}, "above the toe"),
-                                               ({"slab_depth": 2.0}, "slab_depth"), ({"obstacle_place": 145.0}, "obstacle")])
-def test_what_cannot_be_is_told(changes: dict[str, float], said: str, decks: Any, tmp_path: Any) -> None:
-    with pytest.raises(DembarkError, match=said):
-        decks("avalanche", "liggghts", tmp_path, changes)
 
 
 SMALL = {"grain_released": 40, "slope_length": 40.0, "flat_length": 60.0, "gate_place": 18.0, "gate_height": 16.0, "obstacle_place": 5.0,

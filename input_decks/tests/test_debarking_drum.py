@@ -107,11 +107,6 @@ def test_radius_given_decides_how_many_logs(engine: str, tmp_path: Path) -> None
     assert len(GrainsDump(folder / "grains.dump")[0].ids) == 15
 
 
-def test_too_many_logs_are_refused_in_one_line() -> None:
-    with pytest.raises(DembarkError, match=r"filling 0\.5 is too high, the drum has places for"):
-        setup(filling=0.5, log_diameter_min=0.24)
-
-
 @pytest.mark.parametrize("engine", RESUMED)
 def test_killed_run_goes_on_to_the_same_end(engine: str, tmp_path: Path) -> None:
     try:
@@ -122,10 +117,3 @@ def test_killed_run_goes_on_to_the_same_end(engine: str, tmp_path: Path) -> None
     assert 0 < found["went_on_from"] <= found["killed_at_step"] < found["steps"]
     assert found["same"] == dict.fromkeys(FILES, True)
     assert found["impacts"] > 100
-
-
-@pytest.mark.parametrize("engine", RESUMED)
-def test_resume_without_a_state_says_so(engine: str, decks: Any, tmp_path: Path) -> None:
-    one = decks("debarking_drum", engine, tmp_path, TINY)
-    assert one.start(resume="yes").wait(120) != 0
-    assert "no whole state" in one.said()

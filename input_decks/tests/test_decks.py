@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.common.errors import DembarkError
 from dembark.postproc import ContactsDump, GrainsDump, read_times
 from dembark.postproc.replica import Replica
 from dembark.validation.case.deck import derived, prepare, write
@@ -165,11 +164,6 @@ def test_energies_of_a_collapse_balance(engine: str, variant: str, finished: Any
     rows = read_times(run.folder / "time.csv")
     assert (rows["other"] <= 1e-13 * rows["scale"][-1]).all() and (rows["imposed"] == 0.0).all()
     assert measured["run_out"] > 0.1
-
-
-def test_viscosity_without_liquid_is_refused(decks: Any, tmp_path: Path) -> None:
-    with pytest.raises(DembarkError, match="liquid_viscosity"):
-        decks("column_collapse", "liggghts", tmp_path, {"liquid_viscosity": 0.01})
 
 
 @pytest.mark.parametrize(("case", "engine"), [

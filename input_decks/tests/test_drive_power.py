@@ -13,7 +13,6 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import brentq
 
-from dembark.common.errors import DembarkError
 from dembark.input_decks.drive_power.drive import LONGEST, sticking_block
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.postproc import DumpError
@@ -200,16 +199,6 @@ def test_spheres_in_a_plane_stay_in_it_and_rest_after_the_stop(engine: str, simu
     assert not {"power", "flight"} & (names(found, "pass") | names(found, "fail")) and found["power"]["reference"] is None
     rows = run.times()
     assert rows["kinetic_energy"][-1] < 0.01 * rows["kinetic_energy"][rows["step"] <= run.derived["held"]].max()
-
-
-@pytest.mark.parametrize(("changes", "message"), [
-    ({"youngs_modulus": 5e6, "motion_gamma": 3.0}, "raise youngs_modulus"), ({"time_step_fraction": 0.3}, "lower time_step_fraction"),
-    ({"cell_width": 0.015}, "must be at least 4 grain_diameter"), ({"motion": "circular"}, "shake up and down"),
-    ({"motion_amplitude": 0.002}, "not motion_amplitude"),
-])
-def test_decks_that_do_not_suit_the_impacts_are_refused(changes: dict[str, Any], message: str, decks: Any, tmp_path: Path) -> None:
-    with pytest.raises(DembarkError, match=message):
-        decks("drive_power", "liggghts", tmp_path, changes)
 
 
 @pytest.mark.parametrize("profile", ["quick", "standard"])

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dembark.common.errors import DembarkError
 from dembark.common.files import check_impacts, check_times, count_frames
 from dembark.input_decks.common.log_run import LogRun, read
 
@@ -100,11 +98,3 @@ def test_logs_start_as_the_case_says(engine: str, finished: Any) -> None:
     np.testing.assert_allclose(pile.masses, 800.0 * np.pi * pile.radii**2 * 2.0, rtol=1e-12)
     apart = np.linalg.norm(pile.positions[0, :, None] - pile.positions[0, None, :], axis=2) + 10.0 * np.eye(9)
     assert (apart > pile.radii[:, None] + pile.radii[None, :]).all()
-
-
-@pytest.mark.parametrize(("case", "values", "word"), [
-    ("log_pair", {"velocity_1": -1.0}, "velocity_1"), ("log_pair", {"offset": 0.2}, "offset"),
-    ("log_pair", {"target": "wall", "velocity_1": -1.0}, "velocity_1"), ("log_pile", {"width": 0.3}, "width")])
-def test_impossible_set_ups_are_refused(case: str, values: dict[str, Any], word: str, decks: Any, tmp_path: Path) -> None:
-    with pytest.raises(DembarkError, match=word):
-        decks(case, "liggghts", tmp_path, values)

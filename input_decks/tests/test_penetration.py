@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from dembark.common.errors import DembarkError
 from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
@@ -72,16 +71,6 @@ def test_the_public_bed_is_the_published_one() -> None:
     walls = np.array([0.048, 0.029])
     assert (np.abs(places[:, :2]) < walls + 1e-6).all() and places[:, 2].min() > -0.0892431 - 1e-6
     assert places[:, 2].max() + 0.001 == pytest.approx(-0.0555, abs=1e-4)
-
-
-def test_a_public_bed_of_other_grains_is_refused() -> None:
-    with pytest.raises(DembarkError, match="the public bed"):
-        resolve(CASE, None, "public", {"grain_count": 800})
-
-
-def test_a_ball_that_starts_in_the_cloud_is_refused() -> None:
-    with pytest.raises(DembarkError, match="raise ball_height"):
-        begun(**SMALL | {"ball_height": -0.07})
 
 
 @pytest.mark.parametrize("engine", CASE.engines)

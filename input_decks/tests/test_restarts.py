@@ -24,6 +24,7 @@ from dembark.validation.case.folders import find
 from dembark.validation.runs import restarts
 from dembark.validation.runs.simulate import simulate
 
+ALL = ("liggghts", "yade", "lammps")
 OUTPUTS = ("time.csv", "grains.dump", "contacts.dump", "impacts.txt")
 SILO = {"grain_count": 120, "cylinder_radius": 0.018, "settle_time": 0.15, "measure_time": 0.05, "frames": 5, "bridge_volume": 8e-11,
         "restart_every": 700}
@@ -141,9 +142,27 @@ def test_killed_run_goes_on_to_the_same_bytes(case: str, engine: str, ranks: int
     assert [name for name in one if one[name] != other[name]] == []
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
-def test_resuming_without_a_state_says_so(engine: str, prepared: Any) -> None:
-    deck = prepared("silo", engine, SILO).deck
+@pytest.mark.parametrize(("case", "variant", "values", "engine"), [
+    *(("single_contact", "test_8_b", {"points": 3, "time_step": 1e-5, "restart_every": 70}, engine) for engine in ALL),
+    *(("liquid_exchange", None, {"duration": 0.2, "rows": 200, "restart_every": 700}, engine) for engine in ALL[:2]),
+    # While the force on the cylinder still grows.
+    *(("water_tank", "cylinder", {"across": 8, "run_time": 0.45, "restart_every": 300}, engine) for engine in ALL[:2]),
+    *(("water_tank", "drifting", {"across": 8, "restart_every": 60}, engine) for engine in ALL[:2])])
+def test_finished_run_is_resumed_from_its_last_state_to_the_same_files(case: str, variant: str | None, values: dict[str, Any], engine: str,
+                                                                      decks: Any, tmp_path: Path) -> None:
+    given = {key: value for key, value in values.items() if key != "restart_every"}
+    whole, resumed = (Run(decks(case, engine, tmp_path / name, given, variant), values["restart_every"]) for name in ("whole", "resumed"))
+    for run in (whole, resumed):
+        run.go()
+    assert "dembark: resumed at step" in resumed.go(resume="yes")
+    assert whole.written() == resumed.written()
+
+
+@pytest.mark.parametrize("engine", ALL)
+@pytest.mark.parametrize(("case", "values"), [
+    ("silo", SILO), ("debarking_drum", {"log_count": 10, "filling": 0.2, "run_in": 0, "revolutions": 1, "restart_every": 700})])
+def test_resuming_without_a_state_says_so(case: str, values: dict[str, Any], engine: str, prepared: Any) -> None:
+    deck = prepared(case, engine, values).deck
     assert deck.start(resume="yes").wait(60) != 0
     said = deck.said()
     assert "there is no whole state" in said and "Traceback" not in said

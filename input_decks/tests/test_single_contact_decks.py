@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dembark.common.errors import DembarkError
 from dembark.common.files import check_times, count_frames
 from dembark.input_decks.single_contact.impacts import Flight, read
 from dembark.input_decks.tests.measuring import module
 from dembark.physics.exact.contact_law import stepped
 from dembark.postproc import GrainsDump
 from dembark.validation.case.folders import find
-from dembark.validation.case.resolve import resolve
 
 impacts = module("single_contact").impacts
 ENGINES = find("single_contact").engines
@@ -61,23 +58,3 @@ def test_every_sphere_does_what_the_law_demands_in_this_scheme(scene: str, engin
     # The flights before and after are free of forces.
     assert flight.overlaps[-1].max() < 0.0
     assert np.abs(flight.forces[[0, -1]]).max() == 0.0
-
-
-@pytest.mark.parametrize("engine", RESUMED)
-def test_resumed_run_does_the_same(engine: str, decks: Any, tmp_path: Path) -> None:
-    whole, resumed = (decks("single_contact", engine, tmp_path / name, SCENES["test_8_b"], "test_8_b") for name in ("whole", "resumed"))
-    for one in (whole, resumed):
-        one.run(restart_every=70)
-    assert "exactly" in resumed.run(restart_every=70, resume="yes")
-    for name in ("time.csv", "grains.dump"):
-        assert (whole.folder / name).read_bytes() == (resumed.folder / name).read_bytes()
-
-
-@pytest.mark.parametrize("partner", ["mirror", "rest"])
-@pytest.mark.parametrize("sweep", ["direction", "slide"])
-def test_spheres_that_slide_past_each_other_are_refused(partner: str, sweep: str) -> None:
-    """Their line of centres turns during the contact, by an angle that the reference does not know."""
-    with pytest.raises(DembarkError, match="turn their line of centres") as caught:
-        resolve(find("single_contact"), "quick", None, {"partner": partner, "sweep": sweep})
-    assert "\n" not in str(caught.value)
-    assert resolve(find("single_contact"), "quick", None, {"partner": "plane", "sweep": sweep})

@@ -176,18 +176,6 @@ def test_walls_of_wide_kernels_are_the_same_in_both_engines(simulate: Any) -> No
     assert lowest["yade"] == pytest.approx(lowest["liggghts"], abs=1e-3)
 
 
-@pytest.mark.parametrize(("scene", "short", "every"), [("cylinder", {"across": 8, "run_time": 0.45}, 300), ("drifting", {"across": 8}, 60)])
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
-def test_a_run_that_goes_on_is_the_same(engine: str, scene: str, short: Any, every: int, tmp_path: Path, decks: Any) -> None:
-    """While the force on the cylinder still grows."""
-    whole, resumed = (decks("water_tank", engine, tmp_path / name, short, scene) for name in ("whole", "resumed"))
-    for one in (whole, resumed):
-        one.run(restart_every=every)
-    assert "dembark: resumed at step" in resumed.run(restart_every=every, resume="yes")
-    for name in ("time.csv", "grains.dump"):
-        assert (whole.folder / name).read_text() == (resumed.folder / name).read_text()
-
-
 def controls_water_tank(_folder: Path) -> Iterator[Control]:
     right = {scene: verdicts(scene) for scene in ("still", "floating", "falling", "cylinder", "slot", "drifting")}
     yield Control("gravity a fiftieth too strong", right["still"], verdicts("still", heavier=1.02))

@@ -1,0 +1,37 @@
+"""Set-ups that cannot work are refused in one line before a run begins, which names what is wrong."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from dembark.common.errors import DembarkError
+from dembark.validation.case.deck import prepare
+from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
+
+
+@pytest.mark.parametrize(("case", "changes", "named"), [
+    ("avalanche", {"gate_place": 95.0}, "upper end"), ("avalanche", {"gate_place": 2.0}, "above the toe"),
+    ("avalanche", {"slab_depth": 2.0}, "slab_depth"), ("avalanche", {"obstacle_place": 145.0}, "obstacle"),
+    ("column_collapse", {"liquid_viscosity": 0.01}, "liquid_viscosity"),
+    ("debarking_drum", {"filling": 0.5, "log_diameter_min": 0.24, "log_count": 10}, r"filling 0\.5 is too high, the drum has places for"),
+    ("drive_power", {"youngs_modulus": 5e6, "motion_gamma": 3.0}, "raise youngs_modulus"),
+    ("drive_power", {"time_step_fraction": 0.3}, "lower time_step_fraction"),
+    ("drive_power", {"cell_width": 0.015}, "must be at least 4 grain_diameter"),
+    ("drive_power", {"motion": "circular"}, "shake up and down"), ("drive_power", {"motion_amplitude": 0.002}, "not motion_amplitude"),
+    ("liquid_exchange", {"liquid_share": "fraction", "liquid_share_factor": 1.5}, "liquid_share_factor"),
+    ("log_pair", {"velocity_1": -1.0}, "velocity_1"), ("log_pair", {"offset": 0.2}, "offset"),
+    ("log_pair", {"target": "wall", "velocity_1": -1.0}, "velocity_1"), ("log_pile", {"width": 0.3}, "width"),
+    ("penetration", {"bed": "public", "grain_count": 800}, "the public bed"),
+    ("penetration", {"grain_count": 800, "box_length": 0.026, "box_width": 0.026, "ball_diameter": 0.01, "ball_height": -0.07},
+     "raise ball_height"),
+    # The line of centres turns during the contact, by an angle that the reference does not know.
+    *(("single_contact", {"partner": partner, "sweep": sweep}, "turn their line of centres")
+      for partner in ("mirror", "rest") for sweep in ("direction", "slide")),
+])
+def test_impossible_set_ups_are_refused(case: str, changes: dict[str, Any], named: str) -> None:
+    with pytest.raises(DembarkError, match=named) as caught:
+        prepare(find(case), resolve(find(case), None, None, changes))
+    assert "\n" not in str(caught.value)
