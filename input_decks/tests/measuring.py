@@ -92,7 +92,8 @@ def point(parameters: Mapping[str, Any], values: Mapping[str, float], half: floa
         return None if half is None else [value - half - part * abs(value), value + half + part * abs(value)]
 
     return {"parameters": dict(parameters), **more,
-            "quantities": [{"name": name, "value": value, "interval": interval(value), "basis": ""} for name, value in values.items()]}
+            "quantities": [{"name": name, "value": None if np.isnan(value) else value, "interval": interval(value), "basis": ""}
+                           for name, value in values.items()]}
 
 
 def names(found: Verdicts, verdict: str) -> set[str]:

@@ -3,7 +3,6 @@ goes on as if it had not been."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.drum_resume import FILES, Started, compare
+from benchmarks.drum_resume import FILES, compare
 from dembark.common.errors import DembarkError
 from dembark.input_decks.common.setup import Setup
 from dembark.postproc import GrainsDump, read_times
@@ -22,8 +21,6 @@ from dembark.validation.case.resolve import resolve
 
 CASE = find("debarking_drum")
 ENGINES = ("liggghts", "yade", "lammps")
-# Their decks write states to resume from.
-RESUMED = ("liggghts", "yade", "lammps")
 TINY: dict[str, Any] = {"log_count": 10, "filling": 0.2, "run_in": 0, "revolutions": 1, "drum_speed": 2.0, "time_step_fraction": 0.4,
                         "frames": 4}
 
@@ -32,24 +29,14 @@ def setup(**values: Any) -> Setup:
     return prepare(CASE, resolve(CASE, changes=TINY | values))
 
 
-def run(engine: str, folder: Path, **values: Any) -> Path:
-    """A finished run of the deck in `folder`."""
-    try:
-        engines.find(engine)
-    except DembarkError as error:
-        pytest.skip(str(error))
-    Started(engine, folder, TINY | values).wait()
-    return folder
-
-
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Runs by engine, each done once."""
-    return cache(lambda engine: run(engine, tmp_path_factory.mktemp(engine)))
+def finished(simulate: Any) -> Any:
+    """Folders of runs by engine and changed parameters, each done once."""
+    return cache(lambda engine, **values: simulate("debarking_drum", engine, TINY | values).folder)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_logs_are_those_that_the_case_asks_for(engine: str, finished: Callable[[str], Path]) -> None:
+def test_logs_are_those_that_the_case_asks_for(engine: str, finished: Any) -> None:
     prepared = setup()
     logs, radius = prepared.numbers["logs"], prepared.numbers["inner_radius"]
     assert logs == TINY["log_count"]
@@ -65,7 +52,7 @@ def test_logs_are_those_that_the_case_asks_for(engine: str, finished: Callable[[
 
 
 @pytest.mark.parametrize("engine", ENGINES[1:])
-def test_engines_go_the_same_way_until_chaos_takes_over(engine: str, finished: Callable[[str], Path]) -> None:
+def test_engines_go_the_same_way_until_chaos_takes_over(engine: str, finished: Any) -> None:
     """Rows with up to forty impacts; round-off grows with each of them."""
     tables = [read_times(finished(each) / "time.csv") for each in (ENGINES[0], engine)]
     early = (tables[0]["begun"] <= 40) & (tables[1]["begun"] <= 40)
@@ -76,7 +63,7 @@ def test_engines_go_the_same_way_until_chaos_takes_over(engine: str, finished: C
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_energy_and_certificate(engine: str, finished: Callable[[str], Path]) -> None:
+def test_energy_and_certificate(engine: str, finished: Any) -> None:
     times = read_times(finished(engine) / "time.csv")
     assert len(times["step"]) == 200
     assert times["certificate"][-1] <= 1e-10
@@ -88,9 +75,8 @@ def test_energy_and_certificate(engine: str, finished: Callable[[str], Path]) ->
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_only_friction_drives_the_logs(engine: str, tmp_path: Path) -> None:
-    folder = run(engine, tmp_path, shell_friction=0.0, friction=0.0)
-    times = read_times(folder / "time.csv")
+def test_only_friction_drives_the_logs(engine: str, finished: Any) -> None:
+    times = read_times(finished(engine, shell_friction=0.0, friction=0.0) / "time.csv")
     packing, radius = setup().packing, setup().numbers["inner_radius"]
     scale = 9.81 * float((packing.densities * np.pi / 6.0 * packing.diameters**3).sum()) * radius
     assert np.abs(times["torque"]).max() < 1e-9 * scale
@@ -99,15 +85,14 @@ def test_only_friction_drives_the_logs(engine: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_radius_given_decides_how_many_logs(engine: str, tmp_path: Path) -> None:
+def test_radius_given_decides_how_many_logs(engine: str, finished: Any) -> None:
     given = {"drum_radius": 0.9, "filling": 0.15, "drum_speed": 20.0, "frames": 2}
-    folder = run(engine, tmp_path, **given)
     numbers = setup(**given).numbers
     assert (numbers["logs"], numbers["inner_radius"]) == (15, 0.9)
-    assert len(GrainsDump(folder / "grains.dump")[0].ids) == 15
+    assert len(GrainsDump(finished(engine, **given) / "grains.dump")[0].ids) == 15
 
 
-@pytest.mark.parametrize("engine", RESUMED)
+@pytest.mark.parametrize("engine", ENGINES)
 def test_killed_run_goes_on_to_the_same_end(engine: str, tmp_path: Path) -> None:
     try:
         engines.find(engine)
