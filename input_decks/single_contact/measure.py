@@ -10,7 +10,7 @@ from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
 
 from .impact_tests import head_on, mirrored, oblique, restitutions
 from .impacts import Flight, Solutions, impacts, read, sweep
-from .published_curves import beside_published
+from .published_curves import with_published
 
 PUBLISHED = Path(__file__).with_name("reference") / "chung_ooi_2011.csv"
 LABELS = {"published": "Chung and Ooi (2011), DEM", "finite_elements": "Chung and Ooi (2011), finite elements"}
@@ -20,7 +20,7 @@ def measure(replicas: Replicas) -> Measurement:
     """Values and curves of the run (there is one)."""
     p = replicas[0].parameters
     found = measured(p, read(replicas[0], impacts(p), p["lead_steps"] * p["time_step"]))
-    return beside_published(found, PUBLISHED, replicas[0].record["variant"], LABELS)
+    return with_published(found, PUBLISHED, replicas[0].record["variant"], LABELS)
 
 
 def measured(p: Numbers, flight: Flight) -> Measurement:

@@ -18,7 +18,7 @@ from dembark.postproc.statistics import Estimate
 from .impacts import worst
 
 
-def beside_published(found: Measurement, path: Path, variant: str, labels: Mapping[str, str]) -> Measurement:
+def with_published(found: Measurement, path: Path, variant: str, labels: Mapping[str, str]) -> Measurement:
     """`found` with a value <method>_<quantity> for each published curve of `variant`, where it is farthest, and the curves. `path`: a table
     with the columns variant, quantity, material, method, x, y, x_uncertainty and y_uncertainty (95 % limits of the reading), and left_out,
     why a point is drawn but not judged. The curve <quantity>_<material> of `found` is interpolated to the points in its range; farthest is

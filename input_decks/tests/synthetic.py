@@ -62,7 +62,7 @@ def account(rows: int, lost: float) -> dict[str, np.ndarray]:
     return table | {"normal_viscous": (1.0 - lost) * table["normal_viscous"]}
 
 
-def told(folder: Path, **changes: float) -> Path:
+def restated(folder: Path, **changes: float) -> Path:
     """The engine's `folder`, whose records say other parameters than were simulated."""
     for path in folder.glob("replica-*/run.json"):
         record = json.loads(path.read_text())

@@ -18,7 +18,7 @@ D, K, MASS, COUNT, DT = 0.005, 1.3e5, 1.6e-4, 50, 1e-5
 
 
 def run(force: float = 0.4, lost: float = 0.0, heavier: float = 1.0) -> Any:
-    """A wave that goes from contact to contact with the speed of its force, in spheres `heavier` than they are told to be; by each contact
+    """A wave that goes from contact to contact with the speed of its force, in spheres `heavier` than stated; by each contact
     it loses the part `lost` of its force."""
     speed = chain.SPEED * D * K ** (1.0 / 3.0) * force ** (1.0 / 6.0) / np.sqrt(heavier * MASS)
     lag, number = D / speed, np.arange(COUNT - 1)

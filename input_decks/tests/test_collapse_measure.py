@@ -137,7 +137,7 @@ def test_published_laws_where_they_hold() -> None:
     assert column_collapse.height_law(1.0) is None and column_collapse.height_law(32.0) == pytest.approx(4.0)
 
 
-def test_a_high_column_stands_beside_the_experiments_without_a_verdict(tmp_path: Path) -> None:
+def test_a_high_column_has_the_experiments_as_reference_and_no_verdict(tmp_path: Path) -> None:
     """Half as wide it is four times as high."""
     one = replica(tmp_path)
     narrow = Replica(one.folder, {**one.record, "parameters": defaults("column_collapse", bridge_volume=8e-11, column_width=0.02)})

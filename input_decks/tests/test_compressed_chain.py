@@ -20,8 +20,8 @@ SHAPE = np.sin(8.0 * math.pi * np.arange(10) / 9.0)
 REFERENCE = {"adams_order", "adams_estimate", "adams_growth", "impact_time", "impact_order_hooke", "impact_order_hertz"}
 
 
-def verdicts(folder: Path, phase: float = 0.3, *, longer: float = 1.0, told: float = 1.0) -> dict[str, Any]:
-    """Of a run whose steps are `longer` than they are told to be, and whose monitor tells `told` times what it should."""
+def verdicts(folder: Path, phase: float = 0.3, *, longer: float = 1.0, reported: float = 1.0) -> dict[str, Any]:
+    """Of a run whose steps are `longer` than stated, and whose monitor reports `reported` times the right values."""
     p = defaults("compressed_chain", phase=phase, run_steps=1000)
     turn = 2.0 * math.asin(0.5 * phase * longer)
 
@@ -33,7 +33,7 @@ def verdicts(folder: Path, phase: float = 0.3, *, longer: float = 1.0, told: flo
     missed = p["amplitude"] * math.sqrt(float(np.mean(SHAPE[1:-1] ** 2))) * chain.verlet_errors(phase) * [1.0, 5e3]
     lasts = math.pi * math.sqrt(2.0) * math.sin(4.0 * math.pi / 9.0) / phase
     folder.mkdir(exist_ok=True)
-    (folder / "monitor.txt").write_text(" ".join(f"{told * value:.17g}" for value in (*missed, lasts)))
+    (folder / "monitor.txt").write_text(" ".join(f"{reported * value:.17g}" for value in (*missed, lasts)))
     run = SimpleNamespace(folder=folder, parameters=p, derived={"angular": 5e3}, grains=lambda: [frame(50 * k) for k in range(1, 21)])
     return judged("compressed_chain", chain.measure([run]))
 
@@ -77,7 +77,7 @@ def with_integrator(folder: Path, integrate: Any) -> dict[str, Any]:
 def controls_compressed_chain(folder: Path) -> Iterator[Control]:
     right, rough = verdicts(folder), verdicts(folder, 0.2)
     yield Control("a step that is a millionth longer than prescribed", right, verdicts(folder, longer=1.0 + 1e-6))
-    yield Control("a monitor that reports values a twentieth too large", rough, verdicts(folder, 0.2, told=1.05))
+    yield Control("a monitor that reports values a twentieth too large", rough, verdicts(folder, 0.2, reported=1.05))
     second = spoiled(lambda step, time: 0.1 * step**2 * time)
     yield Control("an integrator of second order", right, with_integrator(folder, second))
     yield Control("an integrator that damps", right, with_integrator(folder, spoiled(lambda _, time: 1e-3 * time)))

@@ -131,16 +131,16 @@ def test_spacings_whose_results_approach_each_other_pass() -> None:
 
 
 def test_cubes_that_part_have_no_gap() -> None:
-    """The outer cubes run ahead: after half an edge what is between them and the middle one tells nothing of a gap."""
+    """The outer cubes run ahead: after half an edge there is no gap between them and the middle one."""
     axes = np.arange(1.65, 1.95, 0.0125), np.arange(-0.35, 0.35, 0.0125), [0.01, 0.03]
     lattice = np.stack([part.ravel() for part in np.meshgrid(*axes, indexing="ij")], axis=1)
-    for ahead, told in ((0.0, True), (0.07, True), (0.08, False)):
+    for ahead, gap in ((0.0, True), (0.07, True), (0.08, False)):
         centres = [np.array([1.775 + ahead * (k != 0), 0.2 * k, 0.075]) for k in (-1, 0, 1)]
-        assert np.isfinite(dam.filled(lattice, centres, 0.075, 0.0125)) == told
+        assert np.isfinite(dam.filled(lattice, centres, 0.075, 0.0125)) == gap
 
 
 def test_springs_stop_a_corner_that_lands_within_its_rounding() -> None:
-    """A cube that falls by its edge and lands with one corner, a/sqrt(2) beside its centre, feels a quarter of its mass there: I = M a^2/6.
+    """A cube that falls by its edge and lands with one corner, a/sqrt(2) from its centre, feels a quarter of its mass there: I = M a^2/6.
     With half of the stiffness runs of six ended when one landed."""
     p = defaults("dam_break_cubes")
     speed, mass = np.sqrt(2.0 * 9.81 * p["edge"]), 0.25 * p["cube_density"] * p["edge"] ** 3

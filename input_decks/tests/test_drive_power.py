@@ -25,8 +25,8 @@ ROWS, STILL, RAMP, STEADY = 128, 2, 10, 10
 CHECKS = {"energy_balance", "power_gap", "dissipation_gap", "power", "flight"}
 
 
-def shaken(real: float = 2.0, told: float | None = None, **changes: Any) -> Any:
-    """A block of 1 kg on a plate with the acceleration `real` g, of which the run says that it was `told`; 10 fine steps a row."""
+def shaken(real: float = 2.0, stated: float | None = None, **changes: Any) -> Any:
+    """A block of 1 kg on a plate with the acceleration `real` g, `stated` in the run's record; 10 fine steps a row."""
     fine = 10 * ROWS
     p = defaults("drive_power", periods=STEADY, **changes)
     omega, g = 2.0 * math.pi * p["motion_frequency"], p["gravity"]
@@ -54,7 +54,7 @@ def shaken(real: float = 2.0, told: float | None = None, **changes: Any) -> Any:
     table |= {name: np.zeros(len(time)) for name in zero} | {"scale": np.full(len(time), 2.0 * work[-1])}
     rows = {name: np.asarray(values[10::10]) for name, values in table.items()}
     grain = SimpleNamespace(step=(STILL + RAMP) * fine, masses=np.ones(1))
-    p["motion_gamma"] = real if told is None else told
+    p["motion_gamma"] = real if stated is None else stated
     derived = {"begin": STILL * fine, "period_steps": fine, "held": (STILL + RAMP + STEADY) * fine}
     return SimpleNamespace(parameters=p, derived=derived, times=lambda: rows, grains=lambda: [grain], time_step=step, folder=Path("run"))
 
@@ -166,7 +166,7 @@ def rise_study(dimensions: int, power: float) -> dict[str, Any]:
     return judged("drive_power", drive.study("rise", points, "amplitude"))
 
 
-def test_the_stiffness_is_shown_beside_the_block() -> None:
+def test_the_curve_over_stiffness_has_that_of_the_block() -> None:
     points = [point(defaults("drive_power", youngs_modulus=modulus, motion_gamma=3.0), {"power": 0.7, "flight": 0.8}, 0.1)
               for modulus in (1.4e8, 1.4e7)]
     power, flight = drive.study("stiffness", points, "youngs_modulus").profiles
@@ -211,7 +211,7 @@ def test_every_variant_can_be_set_up_in_every_profile(variant: str, profile: str
 
 def controls_drive_power(_folder: Path) -> Iterator[Control]:
     right = verdicts()
-    yield Control("a plate slower than prescribed", right, verdicts(shaken(told=2.6)))
+    yield Control("a plate slower than prescribed", right, verdicts(shaken(stated=2.6)))
     yield Control("a fiftieth of the plate's force lost", right, verdicts(spoiled(plate_work=0.98)))
     yield Control("a thirtieth of the damping that is not booked", right, verdicts(spoiled(normal_viscous=0.97)))
     yield Control("a gap of first order", step_study(2.0), step_study(1.0))

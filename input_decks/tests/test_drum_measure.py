@@ -37,7 +37,7 @@ def derived(**changes: Any) -> dict[str, Any]:
 def replica(folder: Path, *, seed: int = 0, certificate: float = 1e-15, leak: float = 0.0, lift: float = 1.0,
             stored: float = 0.0, hits: int = 300, speed: float = 0.5, scale: float = 1.0) -> Replica:
     """A drum that takes POWER and loses it, but for a share `leak` that vanishes; in every quarter `hits` impacts of at least 0.1 m/s.
-    `stored` (J): growth of the kinetic energy over the run; a third as many slow contacts stand beside the impacts, with huge forces."""
+    `stored` (J): growth of the kinetic energy over the run; there are a third as many slow contacts, with huge forces."""
     folder.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(seed)
     numbers = derived() | {"every": 10}

@@ -1,4 +1,4 @@
-"""granular_collapse and angle_of_repose: engines form a deposit and a heap, and wrong physics is seen beside the measurements."""
+"""granular_collapse and angle_of_repose: engines form a deposit and a heap, and wrong physics fails."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_run_out_and_height_of_a_deposit(tmp_path: Path) -> None:
     assert found["aspect_ratio_measured"]["value"] == pytest.approx(0.6, rel=0.02) and found["run_out"]["interval"]
 
 
-def test_what_still_moves_is_told(tmp_path: Path) -> None:
+def test_what_still_moves_is_reported(tmp_path: Path) -> None:
     assert "still moving" not in deposit(tmp_path / "rests", 12, 0.6, 1.08, 0.59).remarks[0]
     assert "still moving" in deposit(tmp_path / "moves", 12, 0.6, 1.08, 0.59, speed=0.05).remarks[0]
 
@@ -166,7 +166,7 @@ def test_a_heap_on_a_narrower_plate_has_no_verdict(tmp_path: Path) -> None:
         assert not verdicts(found) and "18 d wide" in found["angle"]["reason"]
 
 
-def test_heaps_of_other_beads_stand_beside_the_other_code_alone(tmp_path: Path) -> None:
+def test_heaps_of_other_beads_are_compared_with_the_other_code_alone(tmp_path: Path) -> None:
     found = heap(tmp_path / "a", 37.0, rolling_friction=0.1, beads="other")
     assert verdicts(found) == {"angle_of_code": "pass"} and found["angle"]["reference"] is None
     assert verdicts(heap(tmp_path / "b", 30.0, rolling_friction=0.1, beads="other")) == {"angle_of_code": "fail"}

@@ -92,7 +92,7 @@ def test_a_pair_by_the_scheme_passes(changes):
     assert {"peak_force", "contact_time", "velocity_1_after", "restitution", "momentum_error", "impulse"} <= names(found, "pass")
 
 
-def test_a_damped_pair_is_shown_beside_the_exact_motion_without_a_verdict():
+def test_a_damped_pair_has_the_exact_motion_as_reference_and_no_verdict():
     run = pair_run()
     found = of_pair(replace(run, parameters=run.parameters | {"contact_damping": 100.0}))
     for name in ("peak_force", "contact_time", "velocity_1_after", "restitution"):

@@ -87,7 +87,7 @@ def convection(speed: float, seed: int = 0) -> Phases:
     return Phases([frame(int(k)) for k in numbers], numbers, 0.1)
 
 
-def test_drift_beside_the_walls() -> None:
+def test_drift_at_the_walls() -> None:
     found = wall_drift(convection(0.1), 0.0, 30 * D, D)
     assert found.value == pytest.approx(-0.1, abs=0.02) and found.half < 0.05
 

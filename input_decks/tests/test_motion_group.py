@@ -169,6 +169,6 @@ def test_a_table_is_read_from_the_folder_of_the_case(shaken: str, tmp_path: Path
     ({"motion": "uniform"}, "neither motion_speed nor motion_acceleration"), ({"motion_sense": 0}, "motion_sense must be 1 or -1"),
     ({"motion": "jolts", "motion_acceleration": 1.0, "motion_duration": 0.2, "motion_interval": 0.1}, "shorter than a pulse"),
     ({"motion_frequency": 0.0}, "motion_frequency")])
-def test_wrong_parameters_are_told_in_one_line(shaken: str, changes: dict[str, Any], line: str) -> None:
+def test_wrong_parameters_are_refused_in_one_line(shaken: str, changes: dict[str, Any], line: str) -> None:
     with pytest.raises(DembarkError, match=line):
         parameters(shaken, **changes)

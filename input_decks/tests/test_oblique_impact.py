@@ -1,4 +1,4 @@
-"""oblique_impact: engines, deck and uncertainties are right, and wrong physics is seen beside the measurement."""
+"""oblique_impact: engines, deck and uncertainties are right, and wrong physics fails."""
 
 from __future__ import annotations
 

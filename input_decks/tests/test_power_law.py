@@ -1,4 +1,4 @@
-"""Exponents of what grows along a parameter, their intervals, and the curves beside a power law."""
+"""Exponents of what grows along a parameter, their intervals, and the curves with a power law."""
 
 import numpy as np
 import pytest

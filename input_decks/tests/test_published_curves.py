@@ -1,4 +1,4 @@
-"""single_contact beside the curves of Chung and Ooi (2011): what agrees with them passes."""
+"""single_contact compared with the curves of Chung and Ooi (2011): what agrees with them passes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.single_contact.published_curves import beside_published
+from dembark.input_decks.single_contact.published_curves import with_published
 from dembark.input_decks.tests.measuring import judged, module, names
 from dembark.postproc.measurement import Measurement
 from dembark.postproc.resampling import profile
@@ -26,7 +26,7 @@ DIFFERENT = {
 
 @pytest.fixture(scope="module")
 def verdicts(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """What a run at eight times the step of the variant is worth beside the published curves, by (variant, engine); each is done once."""
+    """A run at eight times the step of the variant compared with the published curves, by (variant, engine); each is done once."""
     @cache
     def get(variant: str, engine: str) -> dict[str, dict[str, Any]]:
         step = 8.0 * float(find("single_contact").variants[variant]["time_step"])
@@ -60,7 +60,7 @@ def test_the_tolerance_is_that_of_the_declaration(shift: float, verdict: str, tm
                      "".join(f"test_6,recoil,a,published,{x:g},{2.0 * x:g},0.006,0.03\n" for x in (-1.0, 0.5, 1.0, 1.5)) +
                      "test_6,recoil,a,published,1.7,9,0.006,0.03,misprint\n")
     curve = profile("recoil_a", "Recoil", "v", "v after", place, [2.0 * place + shift])
-    measured = beside_published(Measurement({}, [curve]), table, "test_6", single_contact.LABELS)
+    measured = with_published(Measurement({}, [curve]), table, "test_6", single_contact.LABELS)
     (name, one), = judged("single_contact", measured).items()
     assert (name, one["verdict"]) == ("published_recoil", verdict)
     assert "3 points, 1 left out" in one["detail"]  # that outside of the run's range does not count
@@ -72,4 +72,4 @@ def test_curves_that_a_run_does_not_have_are_left_out() -> None:
     """test_7 has none published; spheres of test_4 without friction have none of their own."""
     found = Measurement({}, [])
     for variant in ("test_7", "test_4"):
-        assert beside_published(found, single_contact.PUBLISHED, variant, single_contact.LABELS) == found
+        assert with_published(found, single_contact.PUBLISHED, variant, single_contact.LABELS) == found

@@ -76,7 +76,7 @@ class Run:
         return restarts.newest(self.folder, self.deck.engine.name)
 
     def written(self) -> dict[str, bytes]:
-        """Output files and the states that are left, which tell all digits of all numbers."""
+        """Output files and the states that are left, which hold all digits of all numbers."""
         names = [name for name in OUTPUTS if (self.folder / name).exists()]
         names += sorted(path.name for path in self.folder.glob("state.*.restart"))
         return {name: (self.folder / name).read_bytes() for name in names}

@@ -9,7 +9,7 @@ import xarray
 
 from dembark.input_decks.silo.janssen import two_parameter
 from dembark.input_decks.tests.measuring import Control, compared, dried, judged, measure, measured, module, names, pair, point
-from dembark.input_decks.tests.synthetic import DIAMETER, silo, told
+from dembark.input_decks.tests.synthetic import DIAMETER, restated, silo
 from dembark.physics import capillary_force
 
 SILO = module("silo")
@@ -154,7 +154,7 @@ def measured_silo(tmp_path_factory):
     return measured(folder), xarray.load_dataset(folder / "fields.nc", engine="h5netcdf")
 
 
-def test_silo_has_its_fields_beside_its_metrics(measured_silo):
+def test_silo_has_fields(measured_silo):
     found, fields = measured_silo
     assert fields.attrs["width"] == DIAMETER
     assert {fields[name].attrs["units"] for name in ("stress_zz", "stress_rr", "stress_zr")} == {"Pa"}
@@ -182,7 +182,7 @@ def controls_silo(folder: Path) -> Iterator[Control]:
                          "a lost contact in each layer": {"lost_contacts": 1},
                          "a fiftieth of the wall's force lost": {"lost_wall_force": 0.02}}.items():
         yield Control(name, right, measured(silo(folder / name, noise=0.01, **change)))
-    yield Control("gravity doubled", right, measured(told(silo(folder / "gravity", noise=0.01), gravity=2.0 * 9.81)))
+    yield Control("gravity doubled", right, measured(restated(silo(folder / "gravity", noise=0.01), gravity=2.0 * 9.81)))
     one_calibrates = study()[0]
     for name, change in {"other silos that are almost liquid": {"others": 1e-3},
                          "gravity doubled in other silos": {"heavier": 2.0}}.items():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.single_contact.impacts import Flight
-from dembark.input_decks.single_contact.published_curves import beside_published
+from dembark.input_decks.single_contact.published_curves import with_published
 from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names
 from dembark.physics.exact.contact_law import stepped
 from dembark.physics.exact.impacts import Impacts, partial_slip
@@ -89,8 +89,8 @@ def test_the_set_up_of_the_decks_is_what_they_are_compared_with(variant):
     np.testing.assert_allclose(np.pi / 6.0 * bodies.densities * bodies.diameters**3, one.mass[:count].ravel(), rtol=1e-12)
 
 
-def beside(variant: str, found: Measurement) -> Verdicts:
-    return judged("single_contact", beside_published(found, single_contact.PUBLISHED, variant, single_contact.LABELS))
+def compared(variant: str, found: Measurement) -> Verdicts:
+    return judged("single_contact", with_published(found, single_contact.PUBLISHED, variant, single_contact.LABELS))
 
 
 def of(variant: str, wrong: Callable[[Impacts], Impacts] = lambda one: one, spoil: Callable[[Flight], Flight] = lambda one: one,
@@ -98,7 +98,7 @@ def of(variant: str, wrong: Callable[[Impacts], Impacts] = lambda one: one, spoi
     """What a run at eight times the step is worth in whose impacts something is `wrong`, or in what it wrote."""
     p = parameters(variant)
     p |= {"points": min(p["points"], points), "time_step": 8.0 * p["time_step"]}
-    return beside(variant, single_contact.measured(p, spoil(flown(p, wrong(single_contact.impacts(p))))))
+    return compared(variant, single_contact.measured(p, spoil(flown(p, wrong(single_contact.impacts(p))))))
 
 
 def scaled(**factors: Any) -> Callable[[Impacts], Impacts]:
@@ -114,13 +114,13 @@ def published(variant: str, method: str) -> Verdicts:
     for name, points in groupby(rows, lambda row: f"{row['quantity']}_{row['material']}"):
         x, y = np.array(sorted((float(row["x"]), float(row["y"])) for row in points)).T
         curves.append(profile(name, name, "x", "y", x, [y]))
-    return {name: one for name, one in beside(variant, Measurement({}, curves)).items() if name.startswith(method)}
+    return {name: one for name, one in compared(variant, Measurement({}, curves)).items() if name.startswith(method)}
 
 
 def linear(variant: str) -> Verdicts:
     """What a run with linear springs is worth."""
     p = parameters(variant) | {"points": 17}
-    return beside(variant, single_contact.measured(p, flown(p | {"presliding": "linear"})))
+    return compared(variant, single_contact.measured(p, flown(p | {"presliding": "linear"})))
 
 
 def controls_single_contact(_folder: Path) -> Iterator[Control]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import Control, judged, measure, measured, module, names
-from dembark.input_decks.tests.synthetic import told
+from dembark.input_decks.tests.synthetic import restated
 from dembark.input_decks.tests.synthetic_slabs import gravity_channel, plane_silo
 from dembark.postproc.measurement import Measurement
 
@@ -111,7 +111,7 @@ def controls_plane_silo(folder: Path) -> Iterator[Control]:
                          "a lost contact in each layer": {"lost_contacts": 1},
                          "a fiftieth of the wall's force lost": {"lost_wall_force": 0.02}}.items():
         yield Control(name, right, measured(plane_silo(folder / name, noise=0.01, **change)))
-    yield Control("gravity doubled", right, measured(told(plane_silo(folder / "gravity", noise=0.01), gravity=2.0 * 9.81)))
+    yield Control("gravity doubled", right, measured(restated(plane_silo(folder / "gravity", noise=0.01), gravity=2.0 * 9.81)))
     # A column deep enough to feel K.
     deep = measured(plane_silo(folder / "deep", noise=0.01, friction=0.5))
     for name, inner in (("K of the contacts 20 % too high", 1.2), ("K of the contacts 20 % too low", 0.8)):

@@ -1,4 +1,4 @@
-"""Waves that are put in come out: their power, length and frequency, beside noise; and the drive at which they begin."""
+"""Waves that are put in come out: their power, length and frequency, with noise; and the drive at which they begin."""
 
 from __future__ import annotations
 

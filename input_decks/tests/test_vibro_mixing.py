@@ -25,7 +25,7 @@ SITES = np.array([((i + 0.5) * D, 0.0, (k + 0.5) * D) for i in range(20) for k i
 
 def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: float = 0.0, **changes: Any) -> Any:
     """A run in which `swaps` pairs of grains change places in each period. `rising`: way (d) of the large grains in a period; `drift`:
-    vertical way of the grains beside the walls in a period."""
+    vertical way of the grains at the walls in a period."""
     given = defaults("vibro_mixing", **{"periods": 20, "grain_count": len(SITES)} | changes)
     random, count = np.random.default_rng(3), len(SITES)
     large = np.zeros(count, bool)

@@ -106,7 +106,7 @@ def test_a_block_that_feels_no_water_says_nothing_of_momentum() -> None:
 
 
 def test_the_block_stands_on_the_lattice() -> None:
-    """Also where the particles beside it do not come out even: 35 across the width, 10 across the block."""
+    """Also where the particles at its sides do not come out even: 35 across the width, 10 across the block."""
     case = find("water_tank")
     numbers = prepare(case, resolve(case, variant="drifting", changes={"across": 10, "tank_width": 0.7})).numbers
     assert round((numbers["middle"] - numbers["half"]) / numbers["spacing"], 9) % 1.0 == 0.0
