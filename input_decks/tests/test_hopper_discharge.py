@@ -97,10 +97,9 @@ def test_one_length_against_rolling_gives_the_coefficients_of_grains_and_walls()
 
 
 @pytest.mark.parametrize("engine", find("hopper_discharge").engines)
-def test_a_small_bin_stays_shut_and_then_empties_to_its_slopes(engine: str, decks: Any, tmp_path: Path) -> None:
-    one = decks("hopper_discharge", engine, tmp_path, SMALL)
-    one.run()
-    run, frames = hopper.read(one.replica()), list(one.replica().grains())
+def test_a_small_bin_stays_shut_and_then_empties_to_its_slopes(engine: str, simulate: Any) -> None:
+    one = simulate("hopper_discharge", engine, SMALL)
+    run, frames = hopper.read(one), list(one.grains())
     assert run.share[0] == 0.0 and run.height > 0.004 and frames[0].positions[:, 2].min() > 0.001
     assert 0.5 < run.share[-1] < 0.99
     # Those that stay lie at the walls, in two heaps.
@@ -113,28 +112,24 @@ WALLED = SMALL | {"bin_depth": 0.0075, "ends": "walls"}
 
 
 @pytest.mark.parametrize("engine", find("hopper_discharge").engines)
-def test_front_and_rear_walls_hold_the_grains(engine: str, decks: Any, tmp_path: Path) -> None:
-    one = decks("hopper_discharge", engine, tmp_path, WALLED | {"discharge_time": 0.04})
-    one.run()
-    frames = list(one.replica().grains())
-    for frame in frames:
+def test_front_and_rear_walls_hold_the_grains(engine: str, simulate: Any) -> None:
+    one = simulate("hopper_discharge", engine, WALLED | {"discharge_time": 0.04})
+    for frame in one.grains():
         # Overlaps of grains of 5 MPa at this speed are below a twentieth of the radius.
         inside = frame.positions[:, 1] - 0.95 * frame.radii, WALLED["bin_depth"] - frame.positions[:, 1] - 0.95 * frame.radii
         assert min(side.min() for side in inside) > 0.0
     # At rest each wall pushes the grains away from itself, and as strongly as the other one.
-    rows = one.replica().times()
+    rows = one.times()
     rest = (rows["time"] > 0.1) & (rows["time"] < 0.12)
     front, rear = (rows[f"{name}_fy"][rest].mean() for name in ("front", "rear"))
     assert front > 0.0 and front == pytest.approx(-rear, rel=0.1)
 
 
-def test_the_friction_of_front_and_rear_walls_slows_the_discharge(decks: Any, tmp_path: Path) -> None:
+def test_the_friction_of_front_and_rear_walls_slows_the_discharge(simulate: Any) -> None:
     """Half of the grains have left later than in a periodic slice that is equal in all else."""
     half = {}
     for ends in ("periodic", "walls"):
-        one = decks("hopper_discharge", "liggghts", tmp_path / ends, WALLED | {"ends": ends, "wall_friction": 0.5})
-        one.run()
-        run = hopper.read(one.replica())
+        run = hopper.read(simulate("hopper_discharge", "liggghts", WALLED | {"ends": ends, "wall_friction": 0.5}))
         half[ends] = float(np.interp(0.5, run.share, run.times))
     assert half["walls"] > 1.1 * half["periodic"], half
 

@@ -31,15 +31,10 @@ FLIGHT = {"height_24", "height_28", "deepest_point", "deepest_time", "height_40"
 
 
 @pytest.fixture(scope="module")
-def finished(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def finished(simulate: Any) -> Any:
     """Runs on the small bed by (engine, seed, what is wrong), each done once."""
-    @cache
-    def get(engine: str, seed: int, wrong: str = "", **changes: Any) -> Any:
-        one = decks("penetration", engine, tmp_path_factory.mktemp("penetration"), SMALL | WRONG.get(wrong, {}) | {"seed": seed} | changes)
-        one.run()
-        return one.replica()
-
-    return get
+    return cache(lambda engine, seed, wrong="", **changes: simulate("penetration", engine,
+                                                                    SMALL | WRONG.get(wrong, {}) | {"seed": seed} | changes))
 
 
 def packings(finished: Any, wrong: str = "") -> list[Any]:

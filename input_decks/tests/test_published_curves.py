@@ -25,14 +25,12 @@ DIFFERENT = {
 
 
 @pytest.fixture(scope="module")
-def verdicts(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def verdicts(simulate: Any) -> Any:
     """A run at eight times the step of the variant compared with the published curves, by (variant, engine); each is done once."""
     @cache
     def get(variant: str, engine: str) -> dict[str, dict[str, Any]]:
         step = 8.0 * float(find("single_contact").variants[variant]["time_step"])
-        one = decks("single_contact", engine, tmp_path_factory.mktemp(f"{variant}-{engine}"), {"time_step": step}, variant)
-        one.run()
-        found = judged("single_contact", single_contact.measure([one.replica()]))
+        found = judged("single_contact", single_contact.measure([simulate("single_contact", engine, {"time_step": step}, variant)]))
         return {name: one for name, one in found.items() if name.startswith(("published_", "finite_elements_"))}
 
     return get

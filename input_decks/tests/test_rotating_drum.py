@@ -114,23 +114,21 @@ SMALL = {"drum_radius": 0.03, "drum_speed": 4.0, "solid_filling": 0.15, "run_in"
 
 
 @pytest.mark.parametrize("engine", find("rotating_drum").engines)
-def test_grains_go_up_with_the_lining_and_back_along_the_surface(engine: str, decks: Any, tmp_path: Path) -> None:
-    one = decks("rotating_drum", engine, tmp_path, SMALL)
-    one.run()
-    found = read(one.replica())
+def test_grains_go_up_with_the_lining_and_back_along_the_surface(engine: str, simulate: Any) -> None:
+    one = simulate("rotating_drum", engine, SMALL)
+    found = read(one)
     every = np.ones(len(found.solid), bool)
     assert 20.0 < found.surface_angle(every) < 50.0 and found.solid_body(every) > 0.8
-    last = list(one.replica().grains())[-1]
+    last = list(one.grains())[-1]
     glued = last.select(last.types == 2)
     np.testing.assert_allclose(np.hypot(*glued.positions[:, :2].T), 0.0315, rtol=1e-6)
     np.testing.assert_allclose(glued.velocities, np.cross([0.0, 0.0, 4.0], glued.positions), atol=2e-3 * 4.0 * 0.0315)
 
 
 @pytest.mark.parametrize("engine", find("rotating_drum").engines)
-def test_a_smooth_wall_holds_the_grains_and_drags_them_the_same_way(engine: str, decks: Any, tmp_path: Path) -> None:
-    one = decks("rotating_drum", engine, tmp_path, SMALL | {"wall_lining": "smooth", "run_in": 0.1})
-    one.run()
-    last = list(one.replica().grains())[-1]
+def test_a_smooth_wall_holds_the_grains_and_drags_them_the_same_way(engine: str, simulate: Any) -> None:
+    one = simulate("rotating_drum", engine, SMALL | {"wall_lining": "smooth", "run_in": 0.1})
+    last = list(one.grains())[-1]
     off = 0.03 - last.radii - np.hypot(*last.positions[:, :2].T)
     assert off.min() > -0.05 * 0.003
     low = (off < 0.1 * 0.003) & (last.positions[:, 1] < -0.02)
@@ -138,11 +136,10 @@ def test_a_smooth_wall_holds_the_grains_and_drags_them_the_same_way(engine: str,
 
 
 @pytest.mark.parametrize("engine", find("rotating_drum").engines)
-def test_end_walls_hold_the_grains_and_drag_them_with_the_drum(engine: str, decks: Any, tmp_path: Path) -> None:
-    one = decks("rotating_drum", engine, tmp_path, SMALL | {"ends": "walls"})
-    one.run()
+def test_end_walls_hold_the_grains_and_drag_them_with_the_drum(engine: str, simulate: Any) -> None:
+    one = simulate("rotating_drum", engine, SMALL | {"ends": "walls"})
     aligned = []
-    for frame in one.replica().grains():
+    for frame in one.grains():
         grains = frame.select(frame.types == 1)
         z, radii, force = grains.positions[:, 2], grains.radii, grains.wall_forces["ends"]
         assert (z - radii).min() > -1e-4 and (z + radii).max() < 0.012 + 1e-4

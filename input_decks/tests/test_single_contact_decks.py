@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
 from dembark.common.files import check_times, count_frames
-from dembark.input_decks.single_contact.impacts import Flight, read
+from dembark.input_decks.single_contact.impacts import read
 from dembark.input_decks.tests.measuring import module
 from dembark.physics.exact.contact_law import stepped
 from dembark.postproc import GrainsDump
@@ -28,30 +27,19 @@ SCENES: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.fixture(scope="module")
-def finished(decks: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Short runs by (scene, engine), each done once: (the deck that was run, what the spheres did)."""
-    @cache
-    def get(scene: str, name: str) -> tuple[Any, Flight]:
-        one = decks("single_contact", name, tmp_path_factory.mktemp(f"{scene}-{name}"), SCENES[scene], scene)
-        one.run()
-        return one, read(one.replica(), impacts(one.values), one.values["lead_steps"] * one.values["time_step"])
-
-    return get
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("scene", SCENES)
-def test_every_sphere_does_what_the_law_demands_in_this_scheme(scene: str, engine: str, finished: Any) -> None:
+def test_every_sphere_does_what_the_law_demands_in_this_scheme(scene: str, engine: str, simulate: Any) -> None:
     """Material, restitution coefficient, partner and start of each one: the scheme, written down again, says where each ends."""
-    run, flight = finished(scene, engine)
-    folder, p = run.folder, run.values
+    run = simulate("single_contact", engine, SCENES[scene], scene)
+    folder, p = run.folder, run.parameters
     one = impacts(p)
     assert count_frames(folder / "grains.dump", "ATOMS") == p["frames"]
     assert check_times(folder / "time.csv") >= 200
     frame = GrainsDump(folder / "grains.dump")[0]
     np.testing.assert_allclose(frame.masses[np.argsort(frame.ids)][: len(one)], one.mass[0], rtol=1e-12)
     due = stepped(one, p["time_step"], p["lead_steps"] % 1.0, p["duration"])
+    flight = read(run, one, p["lead_steps"] * p["time_step"])
     after = flight.after
     for value, wanted in ((after.normal, due.normal), (after.slide, due.slide), (one.arm * after.spin, one.arm * due.spin)):
         np.testing.assert_allclose(value / one.closing, wanted / one.closing, rtol=0.0, atol=1e-10)
