@@ -68,7 +68,7 @@ def test_the_public_bed_is_the_published_one() -> None:
     assert places[:, 2].max() + 0.001 == pytest.approx(-0.0555, abs=1e-4)
 
 
-@pytest.mark.parametrize("engine", CASE.engines)
+@pytest.mark.parametrize("engine", [pytest.param(one, marks=pytest.mark.full if one == "yade" else ()) for one in CASE.engines])
 def test_a_bed_settles_and_the_ball_falls_freely_onto_it(engine: str, finished: Any) -> None:
     run = finished(engine, 1, duration=0.0242)
     (free,) = (one for name, one in judged("penetration", penetration.measure([run])).items() if name == "free_flight")

@@ -16,7 +16,7 @@ from dembark.postproc.measurement import Measurement
 from dembark.postproc.resampling import profile
 from dembark.validation.case.folders import find
 
-ENGINES = ("liggghts", "yade")
+ENGINES = ("liggghts", pytest.param("yade", marks=pytest.mark.full))
 single_contact = module("single_contact")
 # Of each test in which a curve was published, those that the law does not follow; README.md says why.
 DIFFERENT = {

@@ -49,6 +49,7 @@ def test_solid_fraction_counts_up_to_the_wall(tmp_path):
     assert found["solid_fraction"]["value"] == pytest.approx(24.0 * np.pi / 6.0 * DIAMETER**2 / (np.pi * 0.025**2), rel=2e-3)
 
 
+@pytest.mark.full
 def test_three_replicas_give_an_interval_over_replicas(tmp_path):
     for replica, k in ((1, 0.78), (2, 0.8), (3, 0.83)):
         folder = silo(tmp_path, replica=replica, k=k, noise=0.1, seed=replica)

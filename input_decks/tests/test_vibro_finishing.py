@@ -94,6 +94,7 @@ def test_the_box_has_room_for_grains_that_part_and_side_pinch(trough: str, decks
     assert float(box[0][1]) > sides + (5.6 * 2.0 * np.pi * 19.3 * 0.002) ** 2 / (2.0 * 9.81) + 0.0055
 
 
+@pytest.mark.full
 def test_a_cylinder_turns_with_its_own_moment_of_inertia(simulate: Any) -> None:
     """In YADE, whose account balances with it; the others refuse it."""
     cylinder, sphere = (simulate("vibro_finishing", "yade", {**SMALL, "part_inertia": value}) for value in (0.5, 0.4))
