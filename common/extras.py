@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .errors import DembarkError
 
-EXTRAS = {**dict.fromkeys(("xarray", "h5netcdf", "h5py", "pyvista", "vtkmodules", "threadpoolctl"), "fields"),
+EXTRAS = {**dict.fromkeys(("xarray", "h5netcdf", "h5py", "pyvista", "vtkmodules"), "fields"),
           **dict.fromkeys(("matplotlib", "mpl_toolkits", "PIL", "weasyprint"), "report")}
 
 

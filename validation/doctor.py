@@ -17,7 +17,7 @@ from dembark.validation.case import folders
 
 # By the extra that installs them; "" is without any.
 _PACKAGES = {"": ("numpy", "scipy", "pandas", "MDAnalysis", "filelock", "jinja2", "pint", "rich", "typer"),
-             "fields": ("xarray", "h5netcdf", "h5py", "pyvista", "threadpoolctl"), "report": ("matplotlib", "weasyprint")}
+             "fields": ("xarray", "h5netcdf", "h5py", "pyvista"), "report": ("matplotlib", "weasyprint")}
 
 
 @dataclass(frozen=True)

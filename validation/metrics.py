@@ -11,7 +11,6 @@ from typing import Any
 from dembark.common.errors import RunError
 from dembark.common.files import read_json
 from dembark.postproc.measurement import FIELDS_FILE, Measurement
-
 from dembark.postproc.replica import Replica
 from dembark.validation import analysis, engines, provenance
 from dembark.validation.case import deck

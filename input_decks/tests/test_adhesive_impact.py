@@ -23,8 +23,8 @@ def verdicts(work: float = 1.0, modulus: float = 1.0, pace: float = 1.0) -> Verd
     p = SimpleNamespace(**PARAMETERS)
     youngs = modulus * effective_youngs_modulus(p.youngs_modulus, p.poisson_ratio, p.youngs_modulus, p.poisson_ratio)
     smooth = FinnieRabinowicz(static_friction=0.0, kinetic_friction=0.0, critical_slip_distance=0.0)
-    contact = Contact(effective_youngs_modulus=youngs, effective_shear_modulus=0.3 * youngs, restitution=1.0, friction=smooth, cohesion="jkr",
-                      work_of_adhesion=work * p.work_of_adhesion)
+    contact = Contact(effective_youngs_modulus=youngs, effective_shear_modulus=0.3 * youngs, restitution=1.0, friction=smooth,
+                      cohesion="jkr", work_of_adhesion=work * p.work_of_adhesion)
     mass, step = p.density * 4.0 / 3.0 * np.pi * p.radius**3, 3.0 * p.time_step
     motions = [drop(contact, Body(radius=p.radius, mass=mass, position=(0.0, 0.0, p.radius * (1.0 + 1e-9)),
                                   velocity=(0.0, 0.0, -pace * ratio * sticking_speed(p))),

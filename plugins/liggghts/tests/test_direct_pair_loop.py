@@ -56,8 +56,8 @@ def test_same_liquid_and_motion_as_in_the_engines_loop(tmp_path):
 PULLED = LIQUID.replace("run 1000\n", "run 998\ngroup two type 2\ndisplace_atoms two move 1e-4 0 1e-4\nrun 2\n")
 
 
-@pytest.mark.parametrize(("ranks", "lanes", "account"), [(1, 2, ""), pytest.param(2, 4, "", marks=pytest.mark.full), pytest.param(2, 8, "", marks=pytest.mark.full),
-                                                         (1, 8, f"{FIX}\n")])
+@pytest.mark.parametrize(("ranks", "lanes", "account"), [
+    (1, 2, ""), pytest.param(2, 4, "", marks=pytest.mark.full), pytest.param(2, 8, "", marks=pytest.mark.full), (1, 8, f"{FIX}\n")])
 def test_liquid_of_bridges_that_a_displacement_breaks_is_given_back(tmp_path, monkeypatch, ranks, lanes, account):
     """They are longer than they may be in a set-up, which changes nothing, and break in the step after it."""
     words = {"deck": PULLED.replace("run 998", f"{account}run 998"), "cohesion": "cohesion capillary", "settings": "carried_liquid on"}
