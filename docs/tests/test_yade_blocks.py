@@ -99,8 +99,8 @@ def fragment(text: str) -> str:
     if "LcpImpact(" in text and "O.engines" in text:
         log = "O.bodies.append(sphere((0, 0, 0), 0.1, material=grain))\n"
         return BEFORE + text + log + "O.dt = 1e-6\nO.run(10, True)\nassert hits.steps == 10"
-    ending = SPHERES + text + "assert liquid.volume(0) == 1e-9" if "CapillaryLiquid(" in text else text
-    return BEFORE + ending
+    before, after = (SPHERES, "assert liquid.volume(0) == 1e-9") if "CapillaryLiquid(" in text else ("", "")
+    return BEFORE + before + text + after
 
 
 def classes() -> dict[str, list[str]]:
