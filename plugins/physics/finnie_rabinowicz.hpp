@@ -57,8 +57,16 @@ struct FinnieRabinowicz {
   Presliding presliding = Presliding::linear;
   FrictionLimit friction_limit = FrictionLimit::total;
 
-  /// Ranges stand in the table of parameters; this is what two of them must be to each other: a line, or nullptr.
-  const char* error() const { return kinetic_friction > static_friction ? "kinetic friction must not exceed static friction" : nullptr; }
+  /// What is wrong with these numbers, or nullptr, for those who do not read them by the table of parameters.
+  const char* error() const {
+    if (!(static_friction >= 0.0) || std::isinf(static_friction)) return "static friction must be a number >= 0";
+    if (!(kinetic_friction >= 0.0)) return "kinetic friction must be a number >= 0";
+    if (kinetic_friction > static_friction) return "kinetic friction must not exceed static friction";
+    if (!(critical_slip_distance >= 0.0)) return "critical slip distance (m) must be >= 0";
+    if (!(interface_shear_strength > 0.0)) return "interface shear strength (Pa) must be > 0; 1e30 or more means unlimited";
+    if (!(healing_time >= 0.0)) return "healing time (s) must be >= 0";
+    return nullptr;
+  }
 };
 
 /// What an engine stores per contact.

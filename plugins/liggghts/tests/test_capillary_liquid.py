@@ -235,10 +235,10 @@ def test_largest_bridge(tmp_path):
     ({"liquid": "wall top 1e-10 0.1 0.5"}, "there is no fix wall/gran top"),
     ({"liquid": "content 0.01\nfix other all capillary/liquid content 0.01"}, "there can be one such fix only"),
     ({"words": "presliding linear", "bridge_volume": VOLUMES}, "liquid is not carried; write 'carried_liquid on'"),
-    ({"bridge_volume": VOLUMES}, "bridgeVolume is given, but with carried_liquid on"),
+    ({"bridge_volume": VOLUMES}, "bridgeVolume is given, but carried liquid"),
     ({"liquid": "content 0.01\nunfix liquid\nthermo_style one"}, "carried_liquid on needs the liquid"),
     ({"liquid": "content 0.01\nset atom 7 property/atom capillaryLiquid -3"}, "grain 7 has liquid"),
-    ({"liquid": "volume 1e-7"}, "a bridge to a primitive wall reaches"),
+    ({"liquid": "volume 1e-7"}, "with a primitive wall reaches"),
     ({"newton": "on"}, "newton"),
 ])
 def test_mistakes_are_one_line(tmp_path, change, told):

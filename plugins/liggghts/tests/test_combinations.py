@@ -11,7 +11,7 @@ from rig.scenarios import Grain, Material, Scenario
 ROOT = Path(__file__).resolve().parents[3]
 COMBINATIONS = set(LIST)
 ROLLING = "\n".join(f"fix p_{name} all property/global {name} peratomtypepair 2 0.1 0.1 0.1 0.1"
-                    for name in ("coefficientRollingFriction", "coefficientRollingViscousDamping"))
+                    for name in ("coefficientRollingFriction", "coefficientRollingViscousDamping", "workOfAdhesion"))
 CASE = Scenario(name="two grains", material=Material(bridge_volume=2e-10), wall=True, steps=3, stride=1, time_step=1e-5, grains=(
     Grain(position=(0.0, 0.0, 4.99e-3), velocity=(0.1, 0.0, 0.0)),
     Grain(position=(9.99e-3, 0.0, 4.99e-3), angular_velocity=(0.0, 50.0, 1.0))))
@@ -19,7 +19,7 @@ CASE = Scenario(name="two grains", material=Material(bridge_volume=2e-10), wall=
 
 def words(normal, tangential, cohesion, rolling, surface, settings=""):
     friction = " presliding exponential" if tangential == "finnie_rabinowicz" else ""
-    bridges = " capillary_model willett" if cohesion == "capillary" else ""
+    bridges = {"capillary": " capillary_model willett", "adhesion": " adhesion_law dmt"}.get(cohesion, "")
     return (f"model {normal} tangential {tangential} cohesion {cohesion} rolling_friction {rolling} surface {surface} {{}}"
             f"{friction}{bridges}{settings}")
 
@@ -33,10 +33,11 @@ def deck(combination, settings="") -> str:
 
 
 def test_documentation_promises_what_is_compiled():
-    assert len(COMBINATIONS) == len(LIST) == 18
+    assert len(COMBINATIONS) == len(LIST) == 20
     normals, rollings = "hertz|hooke", "off|cdt|epsd2"
     laws = {("finnie_rabinowicz", "off"), ("finnie_rabinowicz", "capillary"), ("history", "capillary")}
-    assert {(n, t, c, r, "default") for n in normals.split("|") for r in rollings.split("|") for t, c in laws} == COMBINATIONS
+    adhesive = {(n, "finnie_rabinowicz", "adhesion", "off", "default") for n in normals.split("|")}
+    assert {(n, t, c, r, "default") for n in normals.split("|") for r in rollings.split("|") for t, c in laws} | adhesive == COMBINATIONS
     for page in ("tangential_finnie_rabinowicz", "cohesion_capillary"):
         text = (ROOT / f"docs/reference/liggghts_{page}.md").read_text(encoding="utf-8")
         assert f"`model {normals}`" in text and f"`rolling_friction {rollings}`" in text and "`surface default`" in text

@@ -166,7 +166,7 @@ def stopped_by(text, folder):
 def test_bridge_to_a_wall_longer_than_the_skin(tmp_path):
     text = deck(SCENARIOS["approach, bridge, wall"])
     line = stopped_by(text.replace("neighbor 0.001 bin", "neighbor 0.0002 bin"), tmp_path)
-    assert "cohesion capillary" in line and "use neighbor 0.00" in line
+    assert "cohesion: a bridge" in line and "use neighbor 0.00" in line
 
 
 def test_bridge_longer_than_the_neighbour_lists(tmp_path):
@@ -176,7 +176,7 @@ def test_bridge_longer_than_the_neighbour_lists(tmp_path):
     text = deck(case)
     assert run_deck(tmp_path / "kept", text).code == 0
     line = stopped_by(text.replace("run 600", 'run 600 pre no every 5 "set group all diameter 0.002"'), tmp_path)
-    assert "cohesion capillary" in line and "use neigh_modify contact_distance_factor 1." in line
+    assert "cohesion: a bridge" in line and "use neigh_modify contact_distance_factor 1." in line
 
 
 SIZES = """

@@ -198,6 +198,10 @@ TEST_CASE("spin about the normal turns the displacement with the grains") {
 TEST_CASE("impossible parameters are named") {
   CHECK(law(0.5, 0.3, 1e-5).error() == nullptr);
   CHECK(std::string(law(0.3, 0.5, 1e-5).error()).find("must not exceed") != std::string::npos);
+  CHECK(law(-0.1, -0.2, 1e-5).error() != nullptr);
+  CHECK(law(0.5, 0.3, -1e-5).error() != nullptr);
+  CHECK(law(0.5, 0.3, 1e-5, 0.0).error() != nullptr);
+  CHECK(law(NAN, 0.3, 1e-5).error() != nullptr);
 }
 
 TEST_CASE("asked again in a step of zero length, a sliding contact answers the same force, without viscous part") {

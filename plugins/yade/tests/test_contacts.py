@@ -171,12 +171,8 @@ def test_each_wrong_number_is_told(found):
     """One line that names what is wrong, for wrong, missing and infinite values and those that are no numbers."""
     for case, said in found["bad_values"].items():
         name = case.split()[0]
-        if name == "healingTime" or "Friction" in name or "Slip" in name or "Strength" in name:
-            name = {"healingTime": "healing time", "staticFriction": "static", "kineticFriction": "kinetic",
-                    "criticalSlipDistance": "ritical",
-                    "interfaceShearStrength": "hear"}[name]
         assert said.startswith("dembark: ") and "\n" not in said, (case, said)
-        assert name.lower() in said.lower().replace("staticfriction", "static friction"), (case, said)
+        assert name.lower() in said.lower().replace(" ", ""), (case, said)
 
 
 @pytest.mark.parametrize("scene", ["erased", "on_top_of_a_bridge", "crowd"])

@@ -72,6 +72,6 @@ def test_a_mistake_is_a_runtime_error_and_the_session_goes_on(yade, threads):
     said = json.loads((yade.folder / "said.json").read_text())
     assert said["helper"].startswith("dembark: log: ") and "\n" not in said["helper"]
     assert "\ndembark: no word\n" in said["runner"] and "Traceback" not in said["runner"] + done.stderr
-    for name, parts in (("step", ("restitution of", "is 2")), ("run", ("restitution of", "is 2")), ("engine", ("damping is 0.2",))):
+    for name, parts in (("step", ("restitution must", "not 2")), ("run", ("restitution must", "not 2")), ("engine", ("damping is 0.2",))):
         assert said[name].startswith("dembark: ") and "\n" not in said[name]
         assert all(part in said[name] for part in parts), said[name]

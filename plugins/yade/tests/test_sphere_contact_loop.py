@@ -83,7 +83,7 @@ def test_python_keeps_what_it_knows_of_the_thread(yade):
 
 def test_mistakes_are_told_in_one_line(found):
     said = found["said"]
-    assert said["restitution"].startswith("dembark: restitution of materials 0 and 0 is 2;")
+    assert said["restitution"].startswith("dembark: restitution must be > 0 and <= 1, not 2")
     assert said["no law"].startswith("dembark: SphereContactLoop: no Law2 functor for ScGeom and FinnieRabinowiczPhys of bodies")
     assert said["no physics"].startswith("dembark: SphereContactLoop: no Ip2 functor for the materials of bodies")
     assert said["no geometry"] == "nothing"
