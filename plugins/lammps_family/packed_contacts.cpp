@@ -130,8 +130,8 @@ void PackedContacts::bridges(const PairBlock& block, int first, int count, const
     const dembark::CohesionState before = row ? dembark::load_cohesion(row) : dembark::CohesionState{};
     dembark::CohesionState now = before;
     const ContactParameters& p = law(block, k);
-    cohesive_force[n] = cohesion_step(
-        p.cohesion, {atom_->radius[i], atom_->radius[j], gap[n], touching, p.elasticity.effective_youngs_modulus}, now);
+    cohesive_force[n] =
+        cohesion_step(p.cohesion, {atom_->radius[i], atom_->radius[j], gap[n], touching, p.elasticity.effective_youngs_modulus}, now);
     tally_.note_cohesive_force(k, cohesive_force[n]);
     // One that cannot break in this pass, the set-up of a run, is looked at again in the next.
     if (!touching && (now.held() || (before.held() && !keeps_bridges_))) *block.flags[k] |= bridge_flag_;

@@ -75,7 +75,8 @@ inline void check_reach(LAMMPS_NS::Neighbor* neighbor, LAMMPS_NS::Error* error, 
              rupture_distance, neighbor->skin, 1.01 * rupture_distance);
   else
     snprintf(line, sizeof line,
-             "cohesion: a bridge or held contact reaches %g m but neighbours are kept to %g m only; use neigh_modify contact_distance_factor %.3g",
+             "cohesion: a bridge or held contact reaches %g m but neighbours are kept to %g m only; use neigh_modify "
+             "contact_distance_factor %.3g",
              rupture_distance, reach, (1.0 + rupture_distance / size) * 1.01);
   error->one(FLERR, line);
 }

@@ -26,8 +26,12 @@
 namespace dembark {
 
 /// Pull-off forces (N).
-DEMBARK_FUNCTION inline double dmt_pull_off(double work_of_adhesion, double effective_radius) { return 2.0 * pi * work_of_adhesion * effective_radius; }
-DEMBARK_FUNCTION inline double jkr_pull_off(double work_of_adhesion, double effective_radius) { return 1.5 * pi * work_of_adhesion * effective_radius; }
+DEMBARK_FUNCTION inline double dmt_pull_off(double work_of_adhesion, double effective_radius) {
+  return 2.0 * pi * work_of_adhesion * effective_radius;
+}
+DEMBARK_FUNCTION inline double jkr_pull_off(double work_of_adhesion, double effective_radius) {
+  return 1.5 * pi * work_of_adhesion * effective_radius;
+}
 
 /// The gap (m, > 0) beyond which a JKR contact breaks, equation (3).
 DEMBARK_FUNCTION inline double jkr_rupture_distance(double work_of_adhesion, double effective_radius, double effective_youngs_modulus) {
@@ -36,7 +40,8 @@ DEMBARK_FUNCTION inline double jkr_rupture_distance(double work_of_adhesion, dou
 }
 
 /// Radius (m) of a JKR contact: the larger root a of (1). The overlap (m) may be negative, down to minus jkr_rupture_distance().
-DEMBARK_FUNCTION inline double jkr_contact_radius(double work_of_adhesion, double effective_radius, double effective_youngs_modulus, double overlap) {
+DEMBARK_FUNCTION inline double jkr_contact_radius(double work_of_adhesion, double effective_radius, double effective_youngs_modulus,
+                                                  double overlap) {
   const double c = std::sqrt(2.0 * pi * work_of_adhesion / effective_youngs_modulus);
   // With s = sqrt(a), s^4 / R* - c s - delta is convex, and Newton's method descends to its larger root from any place above it.
   double s = std::cbrt(c * effective_radius) + std::sqrt(std::sqrt(effective_radius * std::fmax(overlap, 0.0)));
@@ -51,14 +56,16 @@ DEMBARK_FUNCTION inline double jkr_contact_radius(double work_of_adhesion, doubl
 }
 
 /// P (N), equation (2), > 0 repulsive.
-DEMBARK_FUNCTION inline double jkr_force(double work_of_adhesion, double effective_radius, double effective_youngs_modulus, double contact_radius) {
+DEMBARK_FUNCTION inline double jkr_force(double work_of_adhesion, double effective_radius, double effective_youngs_modulus,
+                                         double contact_radius) {
   const double cube = contact_radius * contact_radius * contact_radius;
   return 4.0 / 3.0 * effective_youngs_modulus * cube / effective_radius -
          std::sqrt(8.0 * pi * work_of_adhesion * effective_youngs_modulus * cube);
 }
 
 /// Attraction (N) of a JKR contact in addition to Hertz's force at this overlap (m; negative: a gap).
-DEMBARK_FUNCTION inline double jkr_attraction(double work_of_adhesion, double effective_radius, double effective_youngs_modulus, double overlap) {
+DEMBARK_FUNCTION inline double jkr_attraction(double work_of_adhesion, double effective_radius, double effective_youngs_modulus,
+                                              double overlap) {
   const double touching = std::fmax(overlap, 0.0);
   const double hertz = 4.0 / 3.0 * effective_youngs_modulus * std::sqrt(effective_radius * touching) * touching;
   const double radius = jkr_contact_radius(work_of_adhesion, effective_radius, effective_youngs_modulus, overlap);

@@ -61,7 +61,7 @@ struct CohesionState {
 
 /// The gap (m) up to which a contact that has formed is held; `bridge_volume` m^3.
 DEMBARK_FUNCTION inline double cohesion_reach(const Cohesion& cohesion, double radius_1, double radius_2, double effective_youngs_modulus,
-                             double bridge_volume) {
+                                              double bridge_volume) {
   if (cohesion.law == CohesionLaw::bridge) return cohesion.liquid.force->rupture_distance(radius_1, radius_2, bridge_volume);
   if (cohesion.law != CohesionLaw::jkr) return 0.0;
   return jkr_rupture_distance(cohesion.work_of_adhesion, reduced(radius_1, radius_2), effective_youngs_modulus);
