@@ -10,6 +10,7 @@ import pytest
 import typer
 from blocks import FENCE, PAGES, ROOT, blocks, commands, logical_lines, parameter_names
 
+from dembark import _physics
 from dembark.postproc import cli as postproc
 from dembark.validation import cli, engines
 from dembark.validation.case.folders import discover
@@ -158,7 +159,7 @@ def test_readme_names_every_style() -> None:
     styles |= {f"tangential {name}" for name in re.findall(r"^TANGENTIAL_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     styles |= {f"cohesion {name}" for name in re.findall(r"^COHESION_MODEL\(\w+,(\w+),", headers, re.MULTILINE)}
     table = {name for cell in rows(TEXTS["README.md"], "style") for name in re.findall(r"`([^`]+)`", cell)}
-    assert len(styles) == 14 and table == styles
+    assert len(styles) == 15 and table == styles
 
 
 def test_readme_and_pages_name_every_class_of_yade() -> None:
@@ -170,7 +171,7 @@ def test_readme_and_pages_name_every_class_of_yade() -> None:
 
 
 def test_keywords_of_liggghts_exist() -> None:
-    source = code("plugins/liggghts", "plugins/physics")
+    source = code("plugins/liggghts", "plugins/physics") + TABLE
     for page, text in TEXTS.items():
         if page.startswith("docs/reference/liggghts_"):
             cells = rows(text, "keyword", "property", "name")
@@ -182,12 +183,16 @@ def test_keywords_of_liggghts_exist() -> None:
     assert set(registered) <= told
 
 
+# The names that engines and Python make of the table of parameters.
+TABLE = " ".join(f'"{row[key]}"' for row in _physics.contact_parameters() for key in ("name", "camel_case", "liggghts"))
+
+
 @pytest.mark.parametrize(("engine", "folders"), [
     ("LIGGGHTS", ("plugins/liggghts", "plugins/physics", "plugins/lammps_family")),
     ("LAMMPS", ("plugins/lammps", "plugins/physics", "plugins/lammps_family")), ("Python", ("plugins/python/physics",))])
 def test_parameters_exist(engine: str, folders: tuple[str, ...]) -> None:
     named = {name for section in parameter_names(ROOT / "docs/reference/parameters.md", engine).values() for name in section}
-    source = code(*folders)
+    source = code(*folders) + TABLE
     # Those of the stock normal models.
     named -= {"coefficientRestitution", "tangential_damping", "limitForce"} if engine == "LIGGGHTS" else set()
     assert len(named) > 20 and [name for name in named if not re.search(rf'"{name}"|\b{name}: ', source)] == []

@@ -16,7 +16,7 @@ from dembark.input_decks.avalanche.slope_flow import Slope, front_law, mean_powe
 from dembark.input_decks.common.momentum import imbalance
 from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names, point
 from dembark.input_decks.tests.synthetic import account
-from dembark.postproc.tests.scenes import frame_of
+from dembark.postproc.tests.packings import frame_of
 
 avalanche = module("avalanche")
 D, G, DT, EVERY, ROWS = 0.005, 9.81, 1e-5, 10, 400

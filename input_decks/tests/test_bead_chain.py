@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
-from dembark.postproc.tests.scenes import frame_of
+from dembark.postproc.tests.packings import frame_of
 
 chain = module("bead_chain")
 D, K, MASS, COUNT, DT = 0.005, 1.3e5, 1.6e-4, 50, 1e-5

@@ -13,7 +13,7 @@ import pytest
 
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.physics import integrate_adams
-from dembark.postproc.tests.scenes import frame_of
+from dembark.postproc.tests.packings import frame_of
 
 chain = module("compressed_chain")
 SHAPE = np.sin(8.0 * math.pi * np.arange(10) / 9.0)

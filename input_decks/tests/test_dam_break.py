@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
-from dembark.postproc.tests.scenes import frame_of
+from dembark.postproc.tests.packings import frame_of
 from dembark.validation.case.folders import find
 
 dam = module("dam_break")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
-from dembark.postproc.tests.scenes import frame_of
+from dembark.postproc.tests.packings import frame_of
 
 dam = module("dam_break_cubes")
 DT, STRIDE, SPACING = 1e-3, 100, 0.025

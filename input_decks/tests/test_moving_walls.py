@@ -14,7 +14,7 @@ import pytest
 from dembark.input_decks.common.motion import motion
 from dembark.input_decks.moving_walls.measure import Contact, landings, turned
 from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names
-from dembark.postproc.tests.scenes import frame_of
+from dembark.postproc.tests.packings import frame_of
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import portable, resolve
 

@@ -11,7 +11,7 @@ from dembark.common.errors import RunError
 from dembark.input_decks.plug_flow.channel import free_grains
 from dembark.input_decks.tests.measuring import Control, dried, measured, names
 from dembark.input_decks.tests.synthetic import DIAMETER, plug_flow, restated
-from dembark.postproc.tests.scenes import contacts_of, frame_of
+from dembark.postproc.tests.packings import contacts_of, frame_of
 
 
 def test_plug_flow_with_a_known_profile(tmp_path):

@@ -14,7 +14,7 @@ import pytest
 from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names, point
 from dembark.input_decks.tests.synthetic import account
 from dembark.input_decks.transport_container.measure import ring_period, slid, tops
-from dembark.postproc.tests.scenes import frame_of
+from dembark.postproc.tests.packings import frame_of
 from dembark.validation.case.folders import find
 
 container = module("transport_container")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
-from dembark.postproc.tests.scenes import frame_of
+from dembark.postproc.tests.packings import frame_of
 from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import resolve

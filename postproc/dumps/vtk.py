@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista
 from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
 from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
@@ -41,6 +40,8 @@ def read_vtk(path: Path) -> Any:
         vtkLogger.SetStderrVerbosity(loud)
     if found is None or not found.IsA("vtkDataSet") or reader.GetErrorCode() or "ERROR" in said.GetOutput():
         raise CutOffError(f"{path}: truncated, VTK's reader cannot read it ({HINT})")
+    import pyvista
+
     return pyvista.wrap(found)
 
 
@@ -82,7 +83,7 @@ def _box(path: Path, columns: dict[str, Array]) -> tuple[Array, Array, Array]:
         if not boxed.is_file():
             continue
         data = read_vtk(boxed)
-        if data.n_points == 8 and isinstance(data, pyvista.UnstructuredGrid):
+        if data.n_points == 8 and data.GetClassName() == "vtkUnstructuredGrid":
             corner = np.asarray(data.points, float)
             a, b, c = corner[1] - corner[0], corner[3] - corner[0], corner[4] - corner[0]
             return corner[0], corner[0] + (a[0], b[1], c[2]), np.array([b[0], c[0], c[1]])

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pyvista
 from numpy.typing import NDArray
 
 from dembark import _dumps
 
 from ..dumps import DumpError
+
+if TYPE_CHECKING:
+    import pyvista
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -59,6 +62,8 @@ def cut(triangles: Array, place: float = 0.0) -> Array:
 def surface_of(triangles: Array) -> pyvista.PolyData:
     """`triangles` (t, 3, 3) as cells, each with corners of its own."""
     corners = np.ascontiguousarray(triangles.reshape(-1, 3), float)
+    import pyvista
+
     return pyvista.PolyData.from_regular_faces(corners, np.arange(len(corners), dtype=int).reshape(-1, 3).tolist())
 
 

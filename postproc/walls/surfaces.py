@@ -6,14 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pyvista
 from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 
 from .mesh import PRECISION, nearest, read_stl, surface_of
+
+if TYPE_CHECKING:
+    import pyvista
 
 Array = NDArray[np.float64]
 Vector = Sequence[float] | Array
