@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 def skip(text: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)], begin: int, end: int, lines: int) -> tuple:
-    """Pass over whole lines; (position, lines, fault, column)."""
+    """Pass over complete lines; (position, lines, fault, column)."""
 
 def parse(text: Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C', device='cpu', writable=False)], begin: int, end: int, place: Sequence[int], values: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')], row: int, threads: int = 0) -> tuple:
     """

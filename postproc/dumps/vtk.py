@@ -9,9 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
-from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
-from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
 
 from .frames import HINT, Array, CutOffError, Dump, DumpError, DumpWarning, Entry, RawFrame, numbered
 from .source import Source
@@ -26,6 +23,12 @@ _OTHER_NAMES = {"radii": "radius", "velocity_lin": "v", "velocity_ang": "omega",
 
 def read_vtk(path: Path) -> Any:
     """The data set in a file, legacy or XML whatever it is called; DumpError when VTK reports an error."""
+    # Of the extra `fields`: text dumps do without.
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
+    from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
+    from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
+
     reader = vtkGenericDataObjectReader() if Source(path).begins_with(b"# vtk") else vtkXMLGenericDataObjectReader()
     reader.SetFileName(str(path))
     said, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
@@ -40,8 +43,6 @@ def read_vtk(path: Path) -> Any:
         vtkLogger.SetStderrVerbosity(loud)
     if found is None or not found.IsA("vtkDataSet") or reader.GetErrorCode() or "ERROR" in said.GetOutput():
         raise CutOffError(f"{path}: truncated, VTK's reader cannot read it ({HINT})")
-    import pyvista
-
     return pyvista.wrap(found)
 
 
