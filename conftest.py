@@ -1,8 +1,19 @@
 """Options that select long tests, and what all tests share."""
 
+import sys
+from importlib import import_module
+from pathlib import Path
+
 # Before pytest takes the folder packaging/ for this library.
 import packaging.version  # noqa: F401
 import pytest
+
+# pytest imports a test module by its path, and first the packages above it, with names that lack "dembark.": these are no second copies.
+_ROOT = Path(__file__).parent
+for _package in ("common", "input_decks", "postproc", "validation"):
+    for _tests in sorted(_ROOT.glob(f"{_package}/**/tests")):
+        _name = ".".join(_tests.parent.relative_to(_ROOT).parts)
+        sys.modules.setdefault(_name, import_module(f"dembark.{_name}"))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

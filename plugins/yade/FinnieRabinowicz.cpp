@@ -232,7 +232,9 @@ void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& 
 		const std::string           name  = ::dembark::camel_case(p.name);
 		Real                        value = each.ofPair ? pairValue(this->*each.ofPair, ip2 + name, a, b) : this->*each.ofAll;
 		// A viscosity of 0 needs no gap.
-		if (std::isnan(value) || (each.which == ContactNumber::minimum_gap && value == 0.0)) {
+		const bool noGap   = each.which == ContactNumber::minimum_gap && value == 0.0;
+		const bool missing = std::isnan(value) && (each.ofPair || std::isnan(Ip2().*each.ofAll));
+		if (missing || noGap) {
 			if (p.required() && p.name == std::string("restitution"))
 				fail(ip2 + name + " is not set; give it a number or a MatchMaker");
 			// Without a volume materials are dry.

@@ -84,7 +84,7 @@ def _box(path: Path, columns: dict[str, Array]) -> tuple[Array, Array, Array]:
         if not boxed.is_file():
             continue
         data = read_vtk(boxed)
-        if data.n_points == 8 and data.GetClassName() == "vtkUnstructuredGrid":
+        if data.n_points == 8 and data.IsA("vtkUnstructuredGrid"):
             corner = np.asarray(data.points, float)
             a, b, c = corner[1] - corner[0], corner[3] - corner[0], corner[4] - corner[0]
             return corner[0], corner[0] + (a[0], b[1], c[2]), np.array([b[0], c[0], c[1]])
