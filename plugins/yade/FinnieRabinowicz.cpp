@@ -248,6 +248,7 @@ void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& 
 	read_friction({}, PhysSource(*phys, pairName(a, b)));
 	if (phys->newBridgeVolume > 0.0 && phys->surfaceTension < 0.0)
 		fail(ip2 + "surfaceTension (N/m) is not set; a bridgeVolume needs it");
+	if (phys->newBridgeVolume > 0.0 && phys->contactAngle < 0.0) fail(ip2 + "contactAngle is not set; a bridgeVolume needs it");
 	interaction->phys = phys;
 } catch (const std::exception& error) {
 	dembark_yade::postpone(*scene, error);

@@ -10,7 +10,8 @@ namespace dembark {
 /// Of what a number is: of the contact law, of a material, or of a pair of materials.
 enum class Scope { global, type, pair };
 
-struct Parameter {
+// In the order of a row, not of the sizes.
+struct Parameter {   // NOLINT(clang-analyzer-optin.performance.Padding)
   const char* name;  ///< as LAMMPS and Python write it; LIGGGHTS and YADE write camelCase, see camel_case()
   const char* unit;  ///< SI; "1" without
   double low;        ///< smallest value
