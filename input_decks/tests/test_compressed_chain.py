@@ -66,7 +66,7 @@ def test_the_engines_follow_the_exact_solution_of_their_scheme(engine: str, simu
 
 
 def with_integrator(folder: Path, integrate: Any) -> dict[str, Any]:
-    """What is measured with another integrator in the place of Adams'."""
+    """What is measured with another integrator instead of Adams'."""
     chain.integrate_adams = integrate
     try:
         return verdicts(folder)

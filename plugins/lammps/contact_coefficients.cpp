@@ -71,8 +71,8 @@ void ContactCoefficients::settings(int narg, char** arg) {
   bool wet = false, dry = false;
   const auto set = [this](ContactNumber which, double value) {
     const dembark::Parameter& p = dembark::parameter(which);
-    if (const std::string line = dembark::wrong_value(p, p.name, value); !line.empty()) fail(line);
-    global_[static_cast<std::size_t>(which)] = value;
+    if (!p.allows(value)) fail(dembark::wrong_value(p, p.name, value));
+    global_[std::size_t(which)] = value;
   };
   for (int k = 0; k < narg;) {
     const std::string keyword = arg[k++];
@@ -94,7 +94,7 @@ void ContactCoefficients::settings(int narg, char** arg) {
       wet = true;
     } else if (keyword == "viscous_liquid") {
       set(ContactNumber::liquid_viscosity, number(keyword, word()));
-      options_.viscous = global_[static_cast<std::size_t>(ContactNumber::liquid_viscosity)] > 0.0;
+      options_.viscous = global(ContactNumber::liquid_viscosity) > 0.0;
       const double gap = number(keyword, word());
       if (options_.viscous) set(ContactNumber::minimum_gap, gap);
     } else if (keyword == "carried_liquid") choose(keyword, word(), off_on, options_.carried_liquid);
@@ -110,10 +110,10 @@ void ContactCoefficients::settings(int narg, char** arg) {
   if (wet && dry) fail("capillary_model is for the cohesion bridge");
   if (wet) options_.cohesion = dembark::CohesionLaw::bridge;
   const bool bridges = options_.cohesion == dembark::CohesionLaw::bridge;
-  if (!bridges && (!std::isnan(global_[static_cast<std::size_t>(ContactNumber::surface_tension)]) || options_.viscous))
+  if (!bridges && (!std::isnan(global(ContactNumber::surface_tension)) || options_.viscous))
     fail("surface_tension and viscous_liquid need a capillary_model");
   if (!bridges && options_.carried_liquid) fail("carried_liquid needs a capillary_model");
-  if (bridges && std::isnan(global_[static_cast<std::size_t>(ContactNumber::surface_tension)]))
+  if (bridges && std::isnan(global(ContactNumber::surface_tension)))
     fail("capillary_model needs surface_tension S with S (N/m) >= 0 and finite");
 }
 
@@ -160,17 +160,9 @@ std::vector<std::array<int, 2>> ContactCoefficients::coeff(int narg, char** arg)
 }
 
 ContactParameters ContactCoefficients::common() const {
-  ContactParameters p;
-  p.normal_law = options_.normal_law;
-  p.tangential_damping = options_.tangential_damping;
-  p.limit_force = options_.limit_force;
-  p.friction.presliding = options_.presliding;
-  p.friction.friction_limit = options_.friction_limit;
-  p.rolling.model = options_.rolling_model;
-  p.cohesion.law = options_.cohesion;
-  const auto global = [this](dembark::ContactNumber which) { return global_[static_cast<std::size_t>(which)]; };
-  if (options_.viscous)
-    p.cohesion.liquid.viscous = {global(dembark::ContactNumber::liquid_viscosity), global(dembark::ContactNumber::minimum_gap)};
+  using dembark::ContactNumber;
+  ContactParameters p = dembark::chosen_laws(options_);
+  if (options_.viscous) p.cohesion.liquid.viscous = {global(ContactNumber::liquid_viscosity), global(ContactNumber::minimum_gap)};
   return p;
 }
 

@@ -26,6 +26,7 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
   /// Given by pair_style.
   dembark::ContactOptions options_;
   std::array<double, dembark::contact_parameter_count> global_;
+  double global(dembark::ContactNumber which) const { return global_[std::size_t(which)]; }
   std::string words_;  // of the settings
   dembark::PairTable<Given> given_;
   dembark::PairTable<dembark::ContactParameters> parameters_;

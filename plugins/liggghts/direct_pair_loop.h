@@ -165,14 +165,13 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     if (options_.rolling_model != dembark::RollingModel::off) rolling = read_rolling(read, options_);
     if (cohesive && plain_settings_) cohesion = read_cohesion(read, options_);
     laws_ = PairTable<dembark::ContactParameters>(read.types());
+    const dembark::ContactParameters chosen = dembark::chosen_laws(options_);
     for (int i = 1; i <= read.types(); ++i)
       for (int j = 1; j <= read.types(); ++j) {
-        dembark::ContactParameters& p = laws_(i, j);
+        dembark::ContactParameters& p = laws_(i, j) = chosen;
         p.elasticity.effective_youngs_modulus = youngs_modulus[i][j];
         p.elasticity.effective_shear_modulus = shear_modulus[i][j];
         p.elasticity.damping = damping_factor[i][j];
-        p.tangential_damping = options_.tangential_damping;
-        p.limit_force = options_.limit_force;
         p.friction = friction(i, j);
         if (options_.rolling_model != dembark::RollingModel::off) p.rolling = rolling(i, j);
         if (cohesive && plain_settings_) p.cohesion = cohesion(i, j);

@@ -131,20 +131,13 @@ class PropertyReader {
   /// two types.
   double value(const dembark::Parameter& p, int i, int j, bool required) const {
     const std::string name = this->name(p);
-    if (p.scope == dembark::Scope::global) {
-      LAMMPS_NS::FixPropertyGlobal* const fix = find(name.c_str(), "scalar", required);
-      return fix ? fix->compute_scalar() : NAN;
-    }
-    if (p.scope == dembark::Scope::type) {
-      LAMMPS_NS::FixPropertyGlobal* const fix = find(name.c_str(), "peratomtype", required);
-      return fix ? fix->compute_vector(i - 1) : NAN;
-    }
-    if (&p == &parameter(dembark::ContactNumber::contact_angle)) {
-      LAMMPS_NS::FixPropertyGlobal* const fix = find(name.c_str(), "peratomtype", required);
-      return fix ? 0.5 * (fix->compute_vector(i - 1) + fix->compute_vector(j - 1)) : NAN;
-    }
-    LAMMPS_NS::FixPropertyGlobal* const fix = find(name.c_str(), "peratomtypepair", required);
+    const bool angle = &p == &parameter(dembark::ContactNumber::contact_angle), of_type = angle || p.scope == dembark::Scope::type;
+    const bool global = p.scope == dembark::Scope::global;
+    LAMMPS_NS::FixPropertyGlobal* const fix = find(name.c_str(), global ? "scalar" : of_type ? "peratomtype" : "peratomtypepair", required);
     if (!fix) return NAN;
+    if (global) return fix->compute_scalar();
+    if (angle) return 0.5 * (fix->compute_vector(i - 1) + fix->compute_vector(j - 1));
+    if (of_type) return fix->compute_vector(i - 1);
     const double value = fix->compute_array(i - 1, j - 1);
     if (value != fix->compute_array(j - 1, i - 1))
       fail(name + " differs between types " + std::to_string(i) + "-" + std::to_string(j) + " and " + std::to_string(j) + "-" +

@@ -110,7 +110,6 @@ NB_MODULE(_physics, m) {
   });
   m.def("jkr_contact_radius", &jkr_contact_radius);
   m.def("jkr_force", &jkr_force);
-  m.def("jkr_attraction", &jkr_attraction);
   m.def("jkr_rupture_distance", &jkr_rupture_distance);
   m.def("jkr_loss", &jkr_loss);
 

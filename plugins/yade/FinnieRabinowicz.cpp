@@ -94,13 +94,16 @@ const Number numbers[] = {
 	{ContactNumber::healing_time, nullptr, &Ip2::healingTime, &Phys::healingTime},
 };
 
-/// The numbers that a contact keeps, for dembark::read_friction() and its like. All are >= 0; below is: not given.
+/// The numbers that a contact of two materials, or bodies, keeps, for dembark::read_friction() and its like. All are >= 0; below is: not
+/// given.
+template <class Pair>
 class PhysSource : public ::dembark::ContactSource {
-	const Phys&       phys;
-	const std::string pair;
+	const Phys& phys;
+	const Pair& a;
+	const Pair& b;
 
 public:
-	PhysSource(const Phys& contact, const std::string& bodies) : phys(contact), pair(bodies) {}
+	PhysSource(const Phys& contact, const Pair& one, const Pair& other) : phys(contact), a(one), b(other) {}
 	std::string name(const ::dembark::Parameter& p) const override { return ::dembark::camel_case(p.name); }
 	double      given(const ::dembark::Parameter& p, int) const override {
 		for (const Number& each : numbers)
@@ -110,7 +113,7 @@ public:
 	[[noreturn]] void missing(const ::dembark::Parameter& p, int) const override {
 		fail(ip2 + name(p) + " is not set; give it a number" + (p.scope == ::dembark::Scope::pair ? " or a MatchMaker" : ""));
 	}
-	[[noreturn]] void wrong(const std::string& line) const override { fail(line + ", " + pair); }
+	[[noreturn]] void wrong(const std::string& line) const override { fail(line + ", " + pairName(a, b)); }
 };
 
 /// Sets `option` to the one of `names` that an attribute of the law holds.
@@ -233,19 +236,18 @@ void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& 
 		Real                        value = each.ofPair ? pairValue(this->*each.ofPair, ip2 + name, a, b) : this->*each.ofAll;
 		// A viscosity of 0 needs no gap.
 		const bool noGap   = each.which == ContactNumber::minimum_gap && value == 0.0;
-		const bool missing = std::isnan(value) && (each.ofPair || std::isnan(Ip2().*each.ofAll));
+		const bool missing = std::isnan(value) && (each.ofPair || each.which == ContactNumber::surface_tension);
 		if (missing || noGap) {
-			if (p.required() && p.name == std::string("restitution"))
-				fail(ip2 + name + " is not set; give it a number or a MatchMaker");
+			if (each.which == ContactNumber::restitution) fail(ip2 + name + " is not set; give it a number or a MatchMaker");
 			// Without a volume materials are dry.
 			phys.get()->*each.kept = each.which == ContactNumber::bridge_volume ? 0.0 : p.required() ? -1.0 : p.otherwise;
 			continue;
 		}
-		if (const std::string wrong = ::dembark::wrong_value(p, name, value); !wrong.empty()) fail(wrong + ", " + pairName(a, b));
+		if (!p.allows(value)) fail(::dembark::wrong_value(p, name, value) + ", " + pairName(a, b));
 		// An infinite number would not survive saving to XML.
 		phys.get()->*each.kept = std::min(value, 1e300);
 	}
-	read_friction({}, PhysSource(*phys, pairName(a, b)));
+	read_friction({}, PhysSource<Material>(*phys, a, b));
 	if (phys->newBridgeVolume > 0.0 && phys->surfaceTension < 0.0)
 		fail(ip2 + "surfaceTension (N/m) is not set; a bridgeVolume needs it");
 	if (phys->newBridgeVolume > 0.0 && phys->contactAngle < 0.0) fail(ip2 + "contactAngle is not set; a bridgeVolume needs it");
@@ -333,16 +335,13 @@ void Law2::prepare(Phys& phys, const Body& body1, const Body& body2) {
 		     " are both no spheres; the Finnie-Rabinowicz law knows a sphere with a sphere or with a wall");
 	phys.wallBody = sphere1 ? (sphere2 ? 0 : 2) : 1;
 
-	const PhysSource             source(phys, pairName(body1, body2));
+	const PhysSource<Body>       source(phys, body1, body2);
 	const bool                   wet = options.cohesion == ::dembark::CohesionLaw::bridge;
-	::dembark::ContactParameters p;
-	p.normal_law              = options.normal_law;
-	p.elasticity              = {phys.effectiveYoungsModulus, phys.effectiveShearModulus, phys.restitution};
-	p.characteristic_velocity = characteristicVelocity;
-	p.tangential_damping      = options.tangential_damping;
-	p.limit_force             = options.limit_force;
-	p.friction                = read_friction(options, source);
-	p.rolling                 = read_rolling(options, source);
+	::dembark::ContactParameters p   = ::dembark::chosen_laws(options);
+	p.elasticity                     = {phys.effectiveYoungsModulus, phys.effectiveShearModulus, phys.restitution};
+	p.characteristic_velocity        = characteristicVelocity;
+	p.friction                       = read_friction(options, source);
+	p.rolling                        = read_rolling(options, source);
 	if (carriedLiquid && !wet) fail(law2 + "carriedLiquid needs a capillaryModel other than none");
 	// Materials without a bridge volume stay dry among wet ones, until a bridge of theirs is read from a file.
 	::dembark::ContactOptions own = options;

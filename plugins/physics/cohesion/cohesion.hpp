@@ -2,7 +2,8 @@
 //
 // A law gives an attraction (N) along the normal in addition to the normal law, at any overlap or gap, and may hold a contact over a gap:
 // then the contact keeps up to which gap. An engine asks cohesion_step() in each step for pairs that touch or are held. A new law is a name
-// in CohesionLaw, its formula in a header, its rows in the table of parameters and a line in each of error(), holds() and cohesion_step().
+// in CohesionLaw, its formula in a header, its rows in the table of parameters, and a line in cohesion_step() and, where it holds contacts,
+// in holds() and cohesion_reach().
 #pragma once
 
 #include <cmath>
@@ -75,7 +76,7 @@ DEMBARK_FUNCTION inline double cohesion_step(const Cohesion& cohesion, const Coh
     case CohesionLaw::constant: return c.touching ? cohesion.cohesive_force : 0.0;
     case CohesionLaw::dmt: return c.touching ? dmt_pull_off(work, radius) : 0.0;
     case CohesionLaw::jkr:
-      if (c.touching) state.rupture_distance = jkr_rupture_distance(work, radius, c.effective_youngs_modulus);
+      if (c.touching) state.rupture_distance = cohesion_reach(cohesion, c.radius_1, c.radius_2, c.effective_youngs_modulus, 0.0);
       if (state.held() && c.gap <= state.rupture_distance) return jkr_attraction(work, radius, c.effective_youngs_modulus, -c.gap);
       break;
     case CohesionLaw::bridge: {
@@ -84,7 +85,7 @@ DEMBARK_FUNCTION inline double cohesion_step(const Cohesion& cohesion, const Coh
       if (!(state.bridge_volume > 0.0)) {
         if (!c.touching || !(liquid.bridge_volume > 0.0)) return 0.0;
         state.bridge_volume = liquid.bridge_volume;
-        state.rupture_distance = liquid.force->rupture_distance(c.radius_1, c.radius_2, state.bridge_volume);
+        state.rupture_distance = cohesion_reach(cohesion, c.radius_1, c.radius_2, c.effective_youngs_modulus, state.bridge_volume);
       }
       if (!(c.gap > state.rupture_distance))
         return liquid.force->force(c.radius_1, c.radius_2, c.gap, state.bridge_volume, liquid.surface_tension);

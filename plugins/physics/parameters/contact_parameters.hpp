@@ -107,7 +107,7 @@ class ContactSource {
       if (p.required()) missing(p, body);
       value = p.otherwise;
     }
-    if (const std::string line = wrong_value(p, name(p), value); !line.empty()) wrong(line);
+    if (!p.allows(value)) wrong(wrong_value(p, name(p), value));
     return value;
   }
 };
@@ -166,13 +166,23 @@ inline Cohesion read_cohesion(const ContactOptions& options, const ContactSource
   return cohesion;
 }
 
-inline ContactParameters read_contact(const ContactOptions& options, const ContactSource& source) {
+/// The laws without their numbers.
+inline ContactParameters chosen_laws(const ContactOptions& options) {
   ContactParameters p;
   p.normal_law = options.normal_law;
-  p.elasticity = read_elasticity(source);
-  if (p.normal_law == NormalLaw::hooke) p.characteristic_velocity = source.number(ContactNumber::characteristic_velocity);
   p.tangential_damping = options.tangential_damping;
   p.limit_force = options.limit_force;
+  p.friction.presliding = options.presliding;
+  p.friction.friction_limit = options.friction_limit;
+  p.rolling.model = options.rolling_model;
+  p.cohesion.law = options.cohesion;
+  return p;
+}
+
+inline ContactParameters read_contact(const ContactOptions& options, const ContactSource& source) {
+  ContactParameters p = chosen_laws(options);
+  p.elasticity = read_elasticity(source);
+  if (p.normal_law == NormalLaw::hooke) p.characteristic_velocity = source.number(ContactNumber::characteristic_velocity);
   p.friction = read_friction(options, source);
   p.rolling = read_rolling(options, source);
   p.cohesion = read_cohesion(options, source);

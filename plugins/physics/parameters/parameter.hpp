@@ -54,9 +54,8 @@ inline std::string range_text(const Parameter& p) {
   return text;
 }
 
-/// The line about a wrong value: what, what would be right. `name`: as the user has written it. Empty for a right one.
+/// The line about a wrong value: what, what would be right. `name`: as the user has written it.
 inline std::string wrong_value(const Parameter& p, const std::string& name, double value) {
-  if (p.allows(value)) return "";
   return name + (std::string(p.unit) == "1" ? "" : std::string(" (") + p.unit + ")") + " must be " + range_text(p) + ", not " +
          number_text(value);
 }
