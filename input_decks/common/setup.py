@@ -40,7 +40,7 @@ def time_step(p: Parameters) -> float:
     return p.time_step_fraction * rayleigh_time(p)
 
 
-def window(start: int, stride: int, frames: int, rows: int = 1000) -> dict[str, Number]:
+def window(start: int, stride: int, frames: int, rows: int = 1000) -> dict[str, int]:
     """Output steps: `frames` dumps every `stride` steps, the first a stride after step `start`, and about `rows` rows of the history."""
     steps = start + stride * frames
     return {"first": start + stride, "stride": stride, "steps": steps, "every": max(1, steps // rows)}
@@ -54,7 +54,7 @@ def rows_and_frames(step: float, settling: float, duration: float, frames: int) 
     return {"first": first, "stride": stride, "every": every, "steps": first + stride * (frames - 1)}
 
 
-def strides(duration: float, time_step: float, count: int) -> dict[str, Number]:
+def strides(duration: float, time_step: float, count: int) -> dict[str, int]:
     """Output steps: `count` equal strides that cover `duration` (s), or a little more, in steps of `time_step` (s)."""
     stride = math.ceil(duration / time_step / count)
     return {"stride": stride, "steps": stride * count}

@@ -5,7 +5,7 @@ import math
 from dembark.common.errors import DembarkError
 
 from .motion import amplitude
-from .setup import Number, Parameters, time_step
+from .setup import Parameters, time_step
 
 # Frames a period.
 PHASES = 8
@@ -40,7 +40,7 @@ def suitable_step(p: Parameters, speed: float) -> float:
     return time_step(p)
 
 
-def fixed_phases(frequency: float, time_step: float, start: float, periods: int, rows: int = 16) -> tuple[float, dict[str, Number]]:
+def fixed_phases(frequency: float, time_step: float, start: float, periods: int, rows: int = 16) -> tuple[float, dict[str, int]]:
     """Time step (s), at most `time_step`, of which a whole number makes a period of the drive with `frequency` (Hz); and output steps.
     Frames from the end of period `start` (made up to a whole one) on to the end of `periods` more, eight a period and the first one; `rows`
     rows of time.csv from one frame to the next, over the whole run. `period_steps` are the steps of a period."""

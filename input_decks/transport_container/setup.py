@@ -19,10 +19,10 @@ def setup(p: Parameters) -> Setup:
     places, high = packing.slab(p, length, 0.0, margin=0.15 * d_max, foot=0.15 * d_max, rows=1)
     top, half = high + 2.0 * d_max, 2.0 * d
     # Panels of about 10 d; side walls twice as high as the bed lies in the beginning.
-    long, wide, high = (length / 4.0, 0.0, 0.0), (0.0, 2.0 * half, 0.0), (0.0, 0.0, top / 4.0)
-    meshes = {"base": np.vstack([rectangle((length * k / 4.0, -half, 0.0), long, wide) for k in range(4)])}
+    along, wide, up = (length / 4.0, 0.0, 0.0), (0.0, 2.0 * half, 0.0), (0.0, 0.0, top / 4.0)
+    meshes = {"base": np.vstack([rectangle((length * k / 4.0, -half, 0.0), along, wide) for k in range(4)])}
     for name, x in (("left", 0.0), ("right", length)):
-        meshes[name] = np.vstack([rectangle((x, -half, top * k / 4.0), wide, high) for k in range(4)])
+        meshes[name] = np.vstack([rectangle((x, -half, top * k / 4.0), wide, up) for k in range(4)])
     corners = np.array([(x, 0.0, z) for x in (0.0, length) for z in (0.0, top)])
     middle = np.array([0.5 * length, 0.0, 0.0])
     reach = [middle + (corners - middle) @ about_y(moving, t).T + np.asarray(moving.displacement(t))

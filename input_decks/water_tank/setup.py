@@ -1,10 +1,11 @@
 """Water in a tank in the plane: a lattice that fills it, less a body or with a slot in the floor, and walls."""
 
 import math
+from typing import Any
 
 import numpy as np
 
-from dembark.input_decks.common.setup import Number, Parameters, Setup
+from dembark.input_decks.common.setup import Parameters, Setup
 from dembark.input_decks.common.water import fluid_setup, wall_layers, whole
 
 SQUARE = ("floating", "falling", "drifting")
@@ -33,7 +34,7 @@ def setup(p: Parameters) -> Setup:
     count = round(p.size / dx) ** 2 if square else int(within.sum())
     mass, pushed = p.body_density * count * dx**2, p.run_time - 0.5 * p.ramp
     # Its own mass and as much of water are accelerated.
-    body: dict[str, Number] = {"middle": middle, "body_y": body_y, "half": half, "body_count": count, "body_mass": mass,
+    body: dict[str, Any] = {"middle": middle, "body_y": body_y, "half": half, "body_count": count, "body_mass": mass,
                                "body_inertia": mass * p.size**2 / 6.0, "load": 4.0 * mass * p.moved * dx / pushed**2}
     # A jet falls until the end.
     fall = 2.0 * math.sqrt(2.0 * p.gravity * depth) * p.run_time + 0.5 * p.gravity * p.run_time**2 if p.scene == "slot" else 0.0
