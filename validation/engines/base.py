@@ -69,9 +69,8 @@ class EngineFacts:
     on_path: bool = False
     # What makes the ids in its impact files count from 1.
     impact_id_offset: int = 0
-    # What stands in a deck, or in what it includes, when it writes states to resume from; and included files that exclude it.
+    # What stands in a deck, or in what it includes, when it writes states to resume from.
     restart_words: tuple[str, ...] = ()
-    begun_anew: tuple[str, ...] = ()
     # File name patterns of what it leaves in a run's folder and no result needs.
     leftovers: tuple[str, ...] = ()
     # How the line begins that it writes when a signal makes it stop, if it writes one.

@@ -105,7 +105,7 @@ def test_full_disk_costs_no_state(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("case", "deck", "states"), [
-    ("silo", None, True), ("dam_break_cubes", None, True), ("dam_break", None, False), ("water_tank", None, False),
+    ("silo", None, True), ("dam_break_cubes", None, True), ("dam_break", None, True), ("water_tank", None, True),
     ("silo", '{% include "deck.in" %}', False), ("silo", '{% include "resume.in" %}\nrun ${steps}', False)])
 def test_states_are_written_where_the_deck_or_what_it_includes_has_the_fix(tmp_path: Path, case: str, deck: str | None,
                                                                           states: bool) -> None:
