@@ -7,18 +7,22 @@ from pathlib import Path
 
 import pytest
 from blocks import Block, blocks, logical_lines
-from test_liggghts_blocks import alternatives, pattern
+from test_liggghts_blocks import pattern
 
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.case.folders import package_root
 
 DECKS, FRAGMENTS = blocks("LAMMPS deck"), blocks("LAMMPS fragment")
+# Of pages about both engines.
+SHARED = [block for block in blocks("LIGGGHTS fragment") if re.match("docs/reference/(fix|integration)_", block.page)
+          and "pair_style gran" not in block.text]
 # Two grains that just touch above a floor; what a fragment does not say itself.
 HEAD = """
 units           si
 atom_style      sphere
 boundary        f f f
+atom_modify     map array
 newton          off
 comm_modify     vel yes
 region          domain block -0.01 0.02 -0.01 0.01 -0.0025 0.01 units box
@@ -48,12 +52,13 @@ atom_modify     map array sort 0 0.0
 boundary        f f f
 comm_modify     vel yes
 region          domain block -2 2 -2 2 -2 2 units box
-create_box      1 domain
+create_box      {types} domain
 neighbor        0.05 bin
 create_atoms    1 single 0 0 0 units box
-create_atoms    1 single 0.199 0 0 units box
+create_atoms    {types} single 0.199 0 0 units box
 set             group all diameter 0.2
 set             group all mass 50
+group           logs type 1:{types}
 timestep        1e-5
 """
 PAIR = "pair_style dembark/granular"
@@ -85,16 +90,17 @@ def test_complete_deck(block: Block, tmp_path: Path) -> None:
         assert len(rows) == 4 and float(rows[-1][1]) != 0.0 and 5 < float(rows[-1][2]) <= float(rows[-1][3])
 
 
-@pytest.mark.parametrize("block", [block for block in (*FRAGMENTS, *blocks("LIGGGHTS fragment")) if "lcp/impact" in block.text
-                                   and (block.kind == "LAMMPS fragment" or block.page == "README.md")], ids=lambda block: block.place)
+@pytest.mark.parametrize("block", [block for block in SHARED if "lcp/impact" in block.text], ids=lambda block: block.place)
 def test_fragment_of_impacts(block: Block, tmp_path: Path) -> None:
-    for number, lines in enumerate(alternatives(logical_lines(block.text, "&"))):
+    forms = [line for line in logical_lines(block.text, "&") if "wall mesh" not in line]
+    for number, line in enumerate(forms):
         folder = tmp_path / str(number)
         folder.mkdir()
-        assert "Loop time" in run(LOGS + "\n".join([*lines, "fix motion all nve/sphere", "run 20", ""]), folder)
+        types = len(re.search(r"stiffness((?: [\d.e+-]+)+)", line).group(1).split())
+        assert "Loop time" in run("\n".join([LOGS.format(types=types), line, "fix motion all nve/sphere", "run 20", ""]), folder)
 
 
-@pytest.mark.parametrize("block", [block for block in FRAGMENTS if "lcp/impact" not in block.text], ids=lambda block: block.place)
+@pytest.mark.parametrize("block", [block for block in (*FRAGMENTS, *SHARED) if "lcp/impact" not in block.text], ids=lambda block: block.place)
 def test_fragment(block: Block, tmp_path: Path) -> None:
     lines = logical_lines(block.text, "&")
     pairs = [line for line in lines if line.startswith("pair_style")] or [PAIR]

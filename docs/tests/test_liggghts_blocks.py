@@ -141,7 +141,7 @@ def test_syntax_is_that_of_lines_that_run(block: Block) -> None:
 
 
 def test_resumed_run_says_what_its_page_says(liggghts: engines.Engine, tmp_path: Path) -> None:
-    page = "docs/reference/liggghts_fix_resume_exact.md"
+    page = "docs/reference/fix_resume_exact.md"
     (text,) = (block.text for block in blocks("deck") if block.page == page)
     (said,) = (block.text for block in blocks("output") if block.page == page)
     exactly, approximately = said.splitlines()
