@@ -156,7 +156,6 @@ SUBSTITUTES = (
     (r"(dembark deck silo --engine \w+) .*--out", r"\1 --set grain_count=60 --set settle_time=0.05 --set measure_time=0.02 --out",
      "60 grains for 0.07 s in place of 2200 for 1 s"),
     (r"restart_every([ =])5000", r"restart_every\g<1>500", "states every 500 steps in place of 5000"),
-    (r"(python -m benchmarks\.\w+.*)", r"\1 --help", "benchmarks measure for minutes to an hour; their options are checked"),
 )
 
 # Commands that are not run here: pattern, and why. Their subcommands, options and targets are checked all the same.

@@ -100,7 +100,8 @@ def test_fragment_of_impacts(block: Block, tmp_path: Path) -> None:
         assert "Loop time" in run("\n".join([LOGS.format(types=types), line, "fix motion all nve/sphere", "run 20", ""]), folder)
 
 
-@pytest.mark.parametrize("block", [block for block in (*FRAGMENTS, *SHARED) if "lcp/impact" not in block.text], ids=lambda block: block.place)
+@pytest.mark.parametrize("block", [block for block in (*FRAGMENTS, *SHARED) if "lcp/impact" not in block.text],
+                         ids=lambda block: block.place)
 def test_fragment(block: Block, tmp_path: Path) -> None:
     lines = logical_lines(block.text, "&")
     pairs = [line for line in lines if line.startswith("pair_style")] or [PAIR]

@@ -76,20 +76,6 @@ def exists(name: str) -> bool:
     return False
 
 
-def test_table_of_modules_for_fields() -> None:
-    modules = TEXTS["docs/how-to/fields.md"].split("| module | what |")[1].split("\n\n")[0]
-    table = re.findall(r"^\| ((?:`[\w.]+`(?:, )?)+) \| (.*) \|$", modules, re.MULTILINE)
-    assert len(table) > 5
-    for modules, what in table:
-        full = [name if name.startswith("dembark") else f"dembark.postproc{name}" for name in re.findall(r"`([\w.]+)`", modules)]
-        known = [importlib.import_module(name) for name in full]
-        for name in re.findall(r"`([A-Za-z_][\w.]*)`", what):
-            parts = name.split(".")
-            classes = [one for module in known for one in vars(module).values() if isinstance(one, type)]
-            found = next((getattr(holder, parts[0]) for holder in (*known, *classes) if hasattr(holder, parts[0])), None)
-            assert found is not None and all(hasattr(found, part) for part in parts[1:]), f"{name} in {', '.join(full)}"
-
-
 @cache
 def subcommands() -> dict[str, set[str]]:
     """The commands of `dembark` with their options."""
