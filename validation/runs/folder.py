@@ -116,8 +116,8 @@ def enter(folder: Path, file: Path, plan: Plan, chosen: Options, estimates: Mapp
 
 
 def _absolute(value: str) -> str:
-    """A path as it is from every folder; another text as it is."""
-    return str(Path(value).absolute()) if Path(value).exists() else value
+    """A path as it is from every folder; another text, such as none, as it is."""
+    return str(Path(value).absolute()) if value and Path(value).exists() else value
 
 
 def _user() -> str:
