@@ -12,18 +12,13 @@ for _, diameter, _, place, velocity, _ in dembark.packing():
 O.bodies.append(utils.wall((0, 0, 0), axis=2, sense=1, material=O.materials[material]))
 
 writer = dembark.FrameWriter()
-O.engines = [
-    ForceResetter(),
-    InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=0.1 * p.radius),
-    InteractionLoop(
-        [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
-        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=1, staticFriction=0, kineticFriction=0, criticalSlipDistance=0,
-                                                    workOfAdhesion=p.work_of_adhesion)],
-        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(cohesion=p.cohesion)],
-    ),
-    # Between forces and motion, where positions and forces belong to the same time.
-    PyRunner(command="writer.write()", iterPeriod=p.stride, initRun=True),
-    NewtonIntegrator(damping=0),
-]
+loop = InteractionLoop(
+    [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
+    [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=1, staticFriction=0, kineticFriction=0, criticalSlipDistance=0,
+                                                workOfAdhesion=p.work_of_adhesion)],
+    [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(cohesion=p.cohesion)],
+)
+O.engines = dembark.engine_loop(loop, [Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], 0.1 * p.radius, (0, 0, 0), record="writer.write()",
+                                period=p.stride)
 
 dembark.run(p.steps)

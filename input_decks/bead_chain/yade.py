@@ -13,5 +13,5 @@ def record():
         writer.write()
 
 
-O.engines = dembark.engine_loop(p, dembark.contact_loop(p, materials, []), [Bo1_Sphere_Aabb()], 0.1 * p.grain_diameter, (0, 0, 0))
+O.engines = dembark.engine_loop(dembark.contact_loop(p, materials, []), [Bo1_Sphere_Aabb()], 0.1 * p.grain_diameter, (0, 0, 0))
 dembark.run(p.steps, outputs=("time.csv", "grains.dump"))

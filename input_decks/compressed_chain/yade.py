@@ -29,7 +29,7 @@ def record():
 law = Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(normalLaw="hooke", characteristicVelocity=p.characteristic_velocity)
 loop = dembark.contact_loop(p, materials, [])
 loop.lawDispatcher.functors = [law]
-O.engines = dembark.engine_loop(p, loop, [Bo1_Sphere_Aabb()], 0.1 * p.grain_diameter, (0, 0, 0))
+O.engines = dembark.engine_loop(loop, [Bo1_Sphere_Aabb()], 0.1 * p.grain_diameter, (0, 0, 0))
 # Errors in m and m/s; the measurement has them over the true ones.
 watch = IntegrationMonitor(speed=1.0, length=1.0, limit=1e9, every=p.sample, reaction="report")
 O.engines = [*O.engines[:-1], watch, O.engines[-1]]

@@ -22,19 +22,14 @@ def of_pairs(values):
 
 
 writer = dembark.FrameWriter()
-O.engines = [
-    ForceResetter(),
-    InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=0.1 * p.radius),
-    InteractionLoop(
-        [Ig2_Wall_Sphere_ScGeom()],
-        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
-            restitution=of_pairs(p.restitutions), staticFriction=of_pairs(p.frictions), kineticFriction=of_pairs(p.frictions),
-            criticalSlipDistance=0)],
-        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding)],
-    ),
-    # Between forces and motion, where positions and forces belong to the same time.
-    PyRunner(command="writer.write()", iterPeriod=p.stride, initRun=True),
-    NewtonIntegrator(damping=0),
-]
+loop = InteractionLoop(
+    [Ig2_Wall_Sphere_ScGeom()],
+    [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
+        restitution=of_pairs(p.restitutions), staticFriction=of_pairs(p.frictions), kineticFriction=of_pairs(p.frictions),
+        criticalSlipDistance=0)],
+    [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding)],
+)
+O.engines = dembark.engine_loop(loop, [Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], 0.1 * p.radius, (0, 0, 0), record="writer.write()",
+                                period=p.stride)
 
 dembark.run(p.steps)

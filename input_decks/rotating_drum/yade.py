@@ -21,7 +21,7 @@ if closed:
 record = dembark.Recorder(p, walls, boundary="ff ff ff" if closed else "ff ff pp", gravity=weight, glued={"shell": ids.get(2, [])},
                           report=p.stride)
 O.engines = dembark.engine_loop(
-    p, dembark.contact_loop(p, materials, surfaces), bounds=bounds, verlet=0.1 * p.grain_diameter, gravity=weight, periodic=not closed)
+    dembark.contact_loop(p, materials, surfaces), bounds=bounds, verlet=0.1 * p.grain_diameter, gravity=weight, periodic=not closed)
 if p.wall_lining == "grains":
     axis = {"zeroPoint": (0, 0, 0), "rotationAxis": (0, 0, 1)}
     O.engines += [RotationEngine(ids=ids[2], rotateAroundZero=True, angularVelocity=p.drum_speed, **axis)]

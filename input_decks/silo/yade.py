@@ -13,7 +13,7 @@ walls = {"side": O.bodies.append(side), "base": O.bodies.append(utils.wall((0, 0
 liquid = CapillaryLiquid(content=p.liquid_content) if p.carried else None
 record = dembark.Recorder(p, walls, gravity=weight, liquid=liquid)
 O.engines = dembark.engine_loop(
-    p, dembark.contact_loop(p, materials, [Ig2_CylinderWall_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()]),
+    dembark.contact_loop(p, materials, [Ig2_CylinderWall_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()]),
     bounds=[Bo1_Sphere_Aabb(), Bo1_CylinderWall_Aabb(), Bo1_Wall_Aabb()], verlet=0.1 * p.grain_diameter, gravity=weight, liquid=liquid)
 
 dembark.run(p.steps)

@@ -21,18 +21,13 @@ if p.partner == "plane":
 
 rebound = [(materials[m * levels + k], partners[m], value) for m in (0, 1) for k, value in enumerate(p.restitutions)]
 writer = dembark.FrameWriter()
-O.engines = [
-    ForceResetter(),
-    InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=0.1 * p.radius),
-    InteractionLoop(
-        [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
-        [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
-            restitution=MatchMaker(matches=rebound), staticFriction=p.friction, kineticFriction=p.friction, criticalSlipDistance=0)],
-        [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding, frictionLimit=p.friction_limit)],
-    ),
-    # Between forces and motion, where positions and forces belong to the same time.
-    PyRunner(command="writer.write()", iterPeriod=p.stride, initRun=True),
-    NewtonIntegrator(damping=0),
-]
+loop = InteractionLoop(
+    [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
+    [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
+        restitution=MatchMaker(matches=rebound), staticFriction=p.friction, kineticFriction=p.friction, criticalSlipDistance=0)],
+    [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding, frictionLimit=p.friction_limit)],
+)
+O.engines = dembark.engine_loop(loop, [Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], 0.1 * p.radius, (0, 0, 0), record="writer.write()",
+                                period=p.stride)
 
 dembark.run(p.steps)

@@ -1,7 +1,5 @@
 """Vibratory hardening: grains in a trough that moves on a circle, and a part that is clamped in it; all energies are booked."""
 
-import math
-
 from yade import dembark
 
 p = dembark.parameters()
@@ -10,15 +8,7 @@ materials, ids = dembark.begin(p, weight)
 dembark.block(ids[1])
 walls = {name: dembark.mesh(f"{name}.stl", materials[1]) for name in ("trough", "part")}
 moving = dembark.motion(p, walls, ["trough", "part"])
-
-
-def more():
-    """Weight times height of the centre of mass (J), and what belongs to the motion of the walls."""
-    height = math.fsum(O.bodies[k].state.mass * O.bodies[k].state.pos[2] for k in ids[1])
-    return (p.gravity * height, *dembark.motion_values(moving))
-
-
-history = dembark.account_history(("weight_height", *dembark.motion_columns(moving)), more)
+history = dembark.machine_history(ids[1], weight, moving)
 vessel = {"vessel": [*walls["trough"], *walls["part"]]}
 frames = dembark.Recorder(p, vessel, boundary="ff ff ff", gravity=weight, history=history, report=p.stride)
 touches = dembark.TouchWriter("vessel", walls["part"], dembark.box(), boundary="ff ff ff", gravity=weight)

@@ -8,7 +8,7 @@ from yade.dembark.fluids import CubesRecorder, FluidRecorder, FluidWriter, fluid
 from yade.dembark.frames import FrameWriter, StepMeans
 from yade.dembark.friction import set_friction
 from yade.dembark.logs import LogWriter, drum, log, log_loop, log_wall, logs
-from yade.dembark.machines import TouchWriter, account_history
+from yade.dembark.machines import TouchWriter, machine_history
 from yade.dembark.moving import mesh, motion, motion_columns, motion_values
 from yade.dembark.report import fail, finish
 from yade.dembark.scene import (
@@ -34,8 +34,8 @@ from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energi
 
 __all__ = [
     "Balance", "CubesRecorder", "DumpWriter", "EnergyWriter", "FluidRecorder", "FluidWriter", "FrameWriter", "HistoryWriter", "LogWriter",
-    "Recorder", "StepMeans", "TouchWriter", "account_history", "begin", "block", "box", "contact_loop", "drum", "energies", "engine_loop",
-    "fail", "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs", "materials",
+    "Recorder", "StepMeans", "TouchWriter", "begin", "block", "box", "contact_loop", "drum", "energies", "engine_loop", "fail", "finish",
+    "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs", "machine_history", "materials",
     "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "options", "packing", "pairs", "parameters", "periodic", "plane",
     "planes", "run", "set_friction", "slab_loop", "table", "tank_walls",
 ]

@@ -142,7 +142,8 @@ def pairs(materials, between_grains, at_wall):
 
 
 def contact_loop(p, materials, walls, static=None, kinetic=None):
-    """SphereContactLoop of the Finnie-Rabinowicz law with the numbers `p` of a deck; `walls`: Ig2 functors beside that of two spheres.
+    """SphereContactLoop of the Finnie-Rabinowicz law with the numbers `p` of a deck; `walls`: Ig2 functors other than that of
+    two spheres.
 
     `static`, `kinetic`: friction (of grains, of walls) other than that of `p`.
     """
@@ -166,11 +167,14 @@ def contact_loop(p, materials, walls, static=None, kinetic=None):
             capillaryModel=p.capillary_model if p.wet else "none", carriedLiquid=bool(p.carried), **law)])
 
 
-def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, periodic=False, record="record()", moving=(), surface=None):  # noqa: ARG001 (every deck gives its numbers)
-    """All engines of a scene: `loop` from `contact_loop`, `bounds`: Bo1 functors, `verlet` (m): Verlet distance of the collider.
+def engine_loop(loop, bounds, verlet, gravity, liquid=None, account=None, periodic=False, record="record()", period=None, moving=(),
+                surface=None):
+    """All engines of a scene, in the order in which they must run.
 
-    `record`, called in every step between forces and motion, where positions and forces belong to the same time, writes what is due;
-    `moving`: engines of `motion`; `surface`: the FacetSurface that the functor of facets in `loop` asks.
+    `loop`: the InteractionLoop, as from `contact_loop`; `bounds`: Bo1 functors; `verlet` (m): Verlet distance of the collider;
+    `record`: Python that writes what is due, called between forces and motion, where positions and forces belong to the same time: with
+    `period` at step 0 and every `period` steps, by default at every step from 1 on; `liquid`: CapillaryLiquid; `account`: EnergyAccount;
+    `moving`: engines of `motion`; `surface`: the FacetSurface that the functor of facets in `loop` uses.
     """
     sorting = {"allowBiggerThanPeriod": True} if periodic else {}
     return [
@@ -179,7 +183,7 @@ def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, per
         *([surface] if surface is not None else []),
         loop,
         *([liquid] if liquid is not None else []),
-        PyRunner(command=record, iterPeriod=1),
+        PyRunner(command=record, iterPeriod=period or 1, initRun=period is not None),
         *([account] if account is not None else []),
         *moving,
         NewtonIntegrator(damping=0, gravity=gravity),
@@ -189,7 +193,7 @@ def engine_loop(p, loop, bounds, verlet, gravity, liquid=None, account=None, per
 def slab_loop(p, materials, gravity, verlet=0.1, static=None, kinetic=None, **more):
     """All engines of a periodic scene between `planes`; `verlet`: Verlet distance over the mean diameter, `more` as in `engine_loop`."""
     loop = contact_loop(p, materials, [Ig2_Box_Sphere_ScGeom()], static, kinetic)
-    return engine_loop(p, loop, [Bo1_Sphere_Aabb(), Bo1_Box_Aabb()], verlet * p.grain_diameter, gravity, periodic=True, **more)
+    return engine_loop(loop, [Bo1_Sphere_Aabb(), Bo1_Box_Aabb()], verlet * p.grain_diameter, gravity, periodic=True, **more)
 
 
 def mesh_loop(p, materials, gravity, verlet=0.1, static=None, kinetic=None, **more):
@@ -197,7 +201,7 @@ def mesh_loop(p, materials, gravity, verlet=0.1, static=None, kinetic=None, **mo
     surface = FacetSurface()
     loop = contact_loop(p, materials, [Ig2_Box_Sphere_ScGeom(), Ig2_FacetSurface_Sphere_ScGeom(surface=surface)], static, kinetic)
     bounds = [Bo1_Sphere_Aabb(), Bo1_Box_Aabb(), Bo1_Facet_Aabb()]
-    return engine_loop(p, loop, bounds, verlet * p.grain_diameter, gravity, surface=surface, **more)
+    return engine_loop(loop, bounds, verlet * p.grain_diameter, gravity, surface=surface, **more)
 
 
 class Recorder:
