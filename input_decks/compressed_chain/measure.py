@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from dembark.physics import integrate_adams
-from dembark.postproc.measurement import Array, Measurement, Replica, Replicas, Value, exact
+from dembark.postproc.measurement import Array, Measurement, Replica, Replicas, Value, exact, profile
 
 # omega h up to which the estimates of errors are to be right; that of the growth; phases of the step, over which impacts are averaged.
 ESTIMATED, UNDAMPED, PHASES = 0.2, 0.314, 64
@@ -22,7 +22,10 @@ def measure(replicas: Replicas) -> Measurement:
     shape = np.sin(math.pi * count * np.arange(p.grain_count) / (count + 1))
     reported = np.loadtxt(run.folder / "monitor.txt", ndmin=2)[-1]
     lasts = math.pi * math.sqrt(2.0) * math.sin(0.5 * math.pi * count / (count + 1)) / p.phase
-    values = {"phase_error": phase_error(run, shape), "contact_steps": reported[2] / lasts}
+    turn = 2.0 * math.asin(0.5 * p.phase)  # Omega h of the scheme
+    moved, scheme = displacements(run, shape, turn)
+    error = float(np.max(np.abs(moved - scheme))) / (p.amplitude * turn * p.run_steps)
+    values = {"phase_error": error, "contact_steps": reported[2] / lasts}
     if p.phase > ESTIMATED:
         found = values | reference()
         due = {"adams_order": 4.0, "adams_estimate": 1.0, "adams_growth": 1.0, "impact_order_hooke": 2.0, "impact_order_hertz": 2.5,
@@ -32,18 +35,20 @@ def measure(replicas: Replicas) -> Measurement:
         missed = size * verlet_errors(p.phase) * [1.0, run.derived["angular"]]
         found = values | {"position_estimate": reported[0] / missed[0], "velocity_estimate": reported[1] / missed[1]}
         due = dict.fromkeys(("position_estimate", "velocity_estimate", "contact_steps"), 1.0)
-    return Measurement({name: Value(exact(float(value)), exact(due.get(name, 0.0))) for name, value in found.items()})
+    return Measurement({name: Value(exact(float(value)), exact(due.get(name, 0.0))) for name, value in found.items()}, [
+        profile("mode", "Displacements at the end", "sphere", "displacement over the amplitude", np.arange(1.0, count + 1.0),
+                [moved[-1] / p.amplitude], reference=scheme[-1] / p.amplitude, reference_label="solution of the scheme")])
 
 
-def phase_error(run: Replica, shape: Array) -> float:
-    """Largest distance of any sphere in any frame from amplitude * `shape` (spheres,) * cos(Omega t), sin(Omega h / 2) = phase / 2; over
-    amplitude times Omega T."""
-    p = run.parameters
-    turn = 2.0 * math.asin(0.5 * p["phase"])
+def displacements(run: Replica, shape: Array, turn: float) -> tuple[Array, Array]:
+    """Of the free spheres in each frame (frames, spheres), in m: measured, and amplitude * `shape` * cos(`turn` * step)."""
+    p, frames = run.parameters, list(run.grains())
     rest = (p["grain_diameter"] - p["overlap"]) * np.arange(p["grain_count"])
-    off = [np.abs(frame.positions[:, 0] - rest - p["amplitude"] * shape * math.cos(turn * frame.step)) for frame in run.grains()]
-    # Those that are held have no place in the shape.
-    return float(np.max(np.array(off)[:, 1:-1])) / (p["amplitude"] * turn * p["run_steps"])
+    measured = np.array([frame.positions[:, 0] for frame in frames]) - rest
+    steps = np.array([frame.step for frame in frames])
+    scheme = p["amplitude"] * np.cos(turn * steps)[:, None] * shape
+    # The spheres at the ends are held.
+    return measured[:, 1:-1], scheme[:, 1:-1]
 
 
 def verlet_errors(phase: float, steps: int = 2000) -> Array:
