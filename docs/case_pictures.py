@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 
 import weasyprint
-from PIL import Image
+from PIL import Image, ImageOps
 
 DECKS = Path(__file__).resolve().parents[1] / "input_decks"
 PICTURES = Path(__file__).with_name("images") / "cases"
@@ -32,7 +32,9 @@ def figure(results: Path, case: str) -> Image.Image | None:
         page = f'<style>{STYLE}</style><img src="{drawn[0].resolve().as_uri()}">'
         weasyprint.HTML(string=page).write_pdf(f"{folder}/figure.pdf")
         subprocess.run(["pdftoppm", "-r", "96", "-png", "-singlefile", f"{folder}/figure.pdf", f"{folder}/figure"], check=True)
-        return Image.open(f"{folder}/figure.png").convert("RGB")
+        image = Image.open(f"{folder}/figure.png").convert("RGB")
+    # The page is as high as a picture may be, most figures are not.
+    return image.crop(ImageOps.invert(image).getbbox())
 
 
 def main(folder: str) -> None:
