@@ -64,7 +64,7 @@ def pysph_rate(count: int, steps: int) -> float:
     words = map(str, (SYSTEM_PYTHON, HERE / "sph_pysph.py", count, steps, SOUND, step_of(1.0 / count)))
     done = call([*words], HERE, os.environ | ONE_THREAD, 3600)
     if done.returncode:
-        raise RunError("PySPH did not finish", (done.stderr.strip().splitlines() or ["it says nothing"])[-1])
+        raise RunError("PySPH did not finish", (done.stderr.strip().splitlines() or ["no output"])[-1])
     found = json.loads(done.stdout.splitlines()[-1])
     return count**3 * int(found["steps"]) / float(found["seconds"])
 

@@ -68,7 +68,7 @@ def _acquire(lease: SoftFileLease, path: Path, cancel: threading.Event, beat: fl
         raise
 
 
-def held(path: Path, dead_after: float = DEAD_AFTER) -> bool:
+def is_held(path: Path, dead_after: float = DEAD_AFTER) -> bool:
     """Whether a living process seems to hold the lock `path`; for one on another host by its last beat."""
     lease = SoftFileLease(path, lease_duration=dead_after, heartbeat_interval=min(BEAT, 0.5 * dead_after))
     touched = _touched(path)

@@ -33,7 +33,7 @@ def _end_with(parent: BaseProcess) -> None:
     os._exit(1)
 
 
-def mapped(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
+def parallel_map(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
     """`function` of each of `items`, in their order; by as many processes as there are cores when they are many, for which
     `function`, items and what comes of them must be picklable. What `function` raises is raised here; RunError when a process was
     killed."""
@@ -46,4 +46,4 @@ def mapped(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Fou
         with ProcessPoolExecutor(cores, multiprocessing.get_context(method), prepare_worker) as pool:
             return list(pool.map(function, items))
     except BrokenProcessPool:
-        raise RunError("a process that worked on a part of this was killed", "most often because memory ran out") from None
+        raise RunError("a worker process was killed", "most often because memory ran out") from None

@@ -106,7 +106,7 @@ def to_si(text: str, unit: str, name: str = "") -> float:
             raise DembarkError(f"{name} = {text.strip()}: give a number with it, e.g. {example(unit)}" if name else
                                f"{shown} is a unit without a number; give e.g. {example(unit)}")
         kind = "plain number" if unit == "1" else "number, with or without a unit"
-        raise DembarkError(f"{head}{shown} is no {kind}; give e.g. {example(unit)}")
+        raise DembarkError(f"{head}{shown} is not a {kind}; give e.g. {example(unit)}")
     value = _converted(match["number"], match["unit"].strip(), unit, head, shown)
     return finite(value, name, text.strip())
 
@@ -139,12 +139,12 @@ def _converted(number: str, given: str, unit: str, head: str, shown: str) -> flo
 
 def seconds(text: str) -> float:
     """A positive duration in s, of a text such as `90 s`, `10 min`, `2 h 30 min`, `1 d`; DembarkError when it is none."""
-    return _total(text, _TIMES, "duration", '"90 s", "10 min", "2 h 30 min", "1 d"')
+    return _total(text, _TIMES, "a duration", '"90 s", "10 min", "2 h 30 min", "1 d"')
 
 
 def size(text: str) -> float:
     """A positive amount of memory in bytes, of a text such as `800 MB`, `1.5 GB`, `2 GiB`; DembarkError when it is none."""
-    return _total(text, _SIZES, "amount of memory", '"800 MB", "1.5 GB", "2 GiB"')
+    return _total(text, _SIZES, "an amount of memory", '"800 MB", "1.5 GB", "2 GiB"')
 
 
 def _total(text: str, units: Mapping[str, float], what: str, examples: str) -> float:
@@ -154,7 +154,7 @@ def _total(text: str, units: Mapping[str, float], what: str, examples: str) -> f
     parts = _PART.findall(text)
     total = sum(float(number) * units.get(unit, math.nan) for number, unit in parts)
     if _PART.sub("", text).strip() or not total > 0.0:
-        raise DembarkError(f"{text!r} is no {what}", f"wanted is a positive one with its unit: {examples}")
+        raise DembarkError(f"{text!r} is not {what}", f"give a positive one with its unit: {examples}")
     return total
 
 

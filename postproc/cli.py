@@ -44,7 +44,7 @@ ContactColumns = Annotated[dict[str, list[int | str]] | None, typer.Option(parse
 Units = Annotated[str, typer.Option(help="Unit style of dumps that do not name it (ITEM: UNITS): si, cgs, micro, ...; default: si.")]
 Walls = Annotated[list[str] | None, typer.Option("--wall", metavar="NAME:KIND[:KEY=VALUE...]", help=(
     "A wall, by the name of its columns f_force_NAME[1..3]; repeat for more. side:cylinder:radius=25mm, base:plane:normal=z, "
-    "lid:mesh:file=lid.stl:unit=mm, stone:inclusion:ids=1,5-9. Default: those in the record of the run."))]
+    "lid:mesh:file=lid.stl:unit=mm, stone:inclusion:ids=1,5-9. Default: the walls of the run's record."))]
 Plot = Annotated[Path | None, typer.Option(metavar="FOLDER", help="Draw plots (PNG) into this folder.")]
 
 
@@ -93,7 +93,7 @@ def fields(
     only: Annotated[str | None, typer.Option("--fields", metavar="NAME,...", help="Write these only: density,velocity,stress.")] = None,
     out: Annotated[Path | None, typer.Option(help="NetCDF file of the fields, for xarray.")] = None,
     paraview: Annotated[Path | None, typer.Option(help="Collection of VTK files of the fields for ParaView, NAME.pvd.")] = None,
-    grains: Annotated[Path | None, typer.Option(help="The same of the grains of these frames.")] = None,
+    grains: Annotated[Path | None, typer.Option(help="The same for the grains of these frames.")] = None,
     plot: Plot = None,
     time_step: TimeStep = None,
     density: Density = None,

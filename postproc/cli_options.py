@@ -32,7 +32,7 @@ def length(text: str, diameter: float, what: str) -> float:
     """A positive length (m): `1.5d` is in mean diameters, `7 mm` has a unit, a plain number is in m."""
     value = _place(text, diameter, what)
     if not value > 0.0:
-        raise DembarkError(f"{text!r} is no length", f"in {what}", "give a positive one, such as 1.5d (mean diameters) or '7 mm'")
+        raise DembarkError(f"{text!r} is not a length", f"in {what}", "give a positive one, such as 1.5d (mean diameters) or '7 mm'")
     return value
 
 
@@ -56,7 +56,7 @@ def counts(text: str) -> tuple[int, int, int]:
     """Cells along x, y and z: `64,64,64`, or one number for all three."""
     parts = text.split(",")
     if not all(re.fullmatch(r"\s*\d+\s*", part) for part in parts) or len(parts) not in (1, 3) or not all(int(part) for part in parts):
-        raise DembarkError(f"{text!r} is no grid", "in --grid", "give the numbers of cells, such as 64,64,64")
+        raise DembarkError(f"{text!r} is not a grid", "in --grid", "give the numbers of cells, such as 64,64,64")
     cells = [int(part) for part in parts] * (3 // len(parts))
     return cells[0], cells[1], cells[2]
 
@@ -65,7 +65,7 @@ def span(text: str, diameter: float, what: str) -> tuple[float, float]:
     """Two rising places (m), `0,50mm`."""
     ends = [_place(part, diameter, what) for part in text.split(",")]
     if len(ends) != 2 or not ends[0] < ends[1]:
-        raise DembarkError(f"{text!r} is no range", f"in {what}", "give two rising numbers, such as 0,50mm")
+        raise DembarkError(f"{text!r} is not a range", f"in {what}", "give two rising numbers, such as 0,50mm")
     return ends[0], ends[1]
 
 
@@ -125,15 +125,15 @@ def parse_wall(text: str, diameter: float) -> PatchedWall:
     name, *rest = text.split(":")
     where = f"--wall {name}"
     if not re.fullmatch(r"\w+", name) or not rest:
-        raise DembarkError(f"{text!r} is no wall", "in --wall", "write name:kind:key=value, such as side:cylinder:radius=25mm")
+        raise DembarkError(f"{text!r} is not a wall", "in --wall", "write name:kind:key=value, such as side:cylinder:radius=25mm")
     kind, options = rest[0], {}
     if kind not in _KINDS:
-        raise DembarkError(f"{kind!r} is no kind of wall", f"in {where}", f"it must be {', '.join(_KINDS)}{near(kind, _KINDS)}")
+        raise DembarkError(f"{kind!r} is not a kind of wall", f"in {where}", f"it must be {', '.join(_KINDS)}{near(kind, _KINDS)}")
     for part in rest[1:]:
         key, sign, value = part.partition("=")
         if key not in _KINDS[kind]:
             known = _KINDS[kind]
-            raise DembarkError(f"{key!r} is no key of a {kind}", f"in {where}", f"there are {', '.join(known)}{near(key, known)}")
+            raise DembarkError(f"{key!r} is not a key of a {kind}", f"in {where}", f"there are {', '.join(known)}{near(key, known)}")
         if not sign and key != "outside":
             raise DembarkError(f"{key!r} has no value", f"in {where}", f"write {key}=value")
         options[key] = value
@@ -209,13 +209,13 @@ class _WallOptions:
         else:
             values = [to_si(part, unit, f"{self.where}, {key}") for part in text.split(",")]
         if len(values) != 3:
-            raise DembarkError(f"{text!r} is no vector", f"in {self.where}, {key}", "give three numbers, such as 0,0,1")
+            raise DembarkError(f"{text!r} is not a vector", f"in {self.where}, {key}", "give three numbers, such as 0,0,1")
         return values[0], values[1], values[2]
 
     def count(self, key: str) -> int:
         """A number of patches."""
         if not re.fullmatch(r"[1-9]\d*", self.options[key]):
-            raise DembarkError(f"{self.options[key]!r} is no number of patches", f"in {self.where}, {key}", "give an integer from 1 on")
+            raise DembarkError(f"{self.options[key]!r} is not a number of patches", f"in {self.where}, {key}", "give an integer from 1 on")
         return int(self.options[key])
 
     def unit(self) -> float:

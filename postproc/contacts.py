@@ -29,7 +29,7 @@ _DECK_LEFT_OUT = {8}
 
 
 class ContactColumnsError(ColumnsError):
-    """The same of a dump of contacts, where `columns` says what each column is."""
+    """The parameter `columns`, which gives the meaning of each column of a dump of contacts, is needed or does not fit the file."""
 
 
 @dataclass(frozen=True)
@@ -103,12 +103,12 @@ class ContactsDump(TypedDump[ContactFrame]):
 def _schema(raw: RawFrame, where: str) -> Mapping[str, Column]:
     if {"id1", "id2", "x1", "x2", "force[1]"} <= set(raw.columns):
         return _LINES
-    advice = "say by columns= which are first, second, ids, forces"
+    advice = "name those of first, second, ids and forces with columns="
     if len(raw.columns) != _DECK_COLUMNS:
         raise ContactColumnsError(f"{where}: has {len(raw.columns)} columns instead of {_DECK_COLUMNS}; {advice}")
     numbers = [int(match.group(1)) for name in raw.columns if (match := _NUMBERED.fullmatch(name))]
     if sorted(numbers) == list(range(1, _DECK_COLUMNS + 1)) != numbers:
-        raise ContactColumnsError(f"{where}: the numbers of its {_DECK_COLUMNS} columns are not in their order; {advice}")
+        raise ContactColumnsError(f"{where}: its {_DECK_COLUMNS} columns are not numbered in their order; {advice}")
     return _DECK
 
 

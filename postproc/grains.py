@@ -120,7 +120,7 @@ class _Table:
             self.ids = self.ids[self._order]
             twice = np.flatnonzero(self.ids[1:] == self.ids[:-1])
             if len(twice):
-                raise DumpError(f"{where}: grain {self.ids[twice[0]]} is there twice")
+                raise DumpError(f"{where}: grain {self.ids[twice[0]]} appears twice")
 
     def has(self, names: Sequence[str]) -> bool:
         return self.index.keys() >= set(names)
@@ -197,7 +197,7 @@ def grain_frame(raw: RawFrame, where: str, density: float | None = None, say: Sa
     if kept:
         say(KEPT_UNITS.format(", ".join(kept), units))
     if twice := sorted({name for name in raw.columns if raw.columns.count(name) > 1}):
-        say(f"columns {', '.join(twice)} are there more than once; the first of each counts")
+        say(f"columns {', '.join(twice)} appear more than once; the first of each is used")
     if any(name.startswith(_SHAPE) for name in raw.columns):
         say("grains are taken as spheres of their radius, though the dump has columns of a shape")
     if not raw.columns and not len(raw.values):

@@ -68,7 +68,7 @@ def scalar(fields: FieldSet, name: str) -> tuple[Array, str, str]:
         return np.sqrt((values**2).sum(axis=tuple(range(3, values.ndim)))), unit, "speed" if base == "velocity" else label
     if len(part) != values.ndim - 3 or any(letter not in _AXES for letter in part):
         right = {3: base, 4: f"{base}:x or {base}:magnitude", 5: f"{base}:xy"}[values.ndim]
-        raise DembarkError(f"{name!r} is no scalar", "", f"write {right}")
+        raise DembarkError(f"{name!r} is not a scalar", "", f"write {right}")
     component: tuple[Any, ...] = (..., *(_AXES.index(letter) for letter in part))
     return values[component], unit, label
 
@@ -124,10 +124,10 @@ def _map(figure: Figure, axes: Axes, spans: Sequence[Array], values: Array, labe
     bar.outline.set_linewidth(0.4)
     bar.ax.tick_params(labelsize=6)
     bar.ax.yaxis.set_major_formatter(_NUMBERS)
-    axes.set_title(labelled(label, unit), fontsize=7.0)
+    axes.set_title(axis_label(label, unit), fontsize=7.0)
 
 
-def labelled(label: str, unit: str) -> str:
+def axis_label(label: str, unit: str) -> str:
     """A quantity over its unit, as an axis says it."""
     if unit == "1":
         return label
@@ -153,7 +153,7 @@ def profile_figure(fields: FieldSet, names: Sequence[str], axis: str = "z") -> F
             mean = np.divide(np.where(known, values, 0.0).sum(axis=others), count, out=np.full(len(place), np.nan), where=count > 0)
             axes = figure.add_subplot(rows, columns, number + 1)
             axes.plot(*((mean, place) if axis == "z" else (place, mean)), color=_PAINT[0])
-            text = labelled(label, unit)
+            text = axis_label(label, unit)
             axes.set(**({"xlabel": text, "ylabel": "z / mm"} if axis == "z" else {"xlabel": f"{axis} / mm", "ylabel": text}))
             (axes.xaxis if axis == "z" else axes.yaxis).set_major_formatter(_NUMBERS)
             axes.locator_params(axis="x", nbins=4)
@@ -211,7 +211,7 @@ def _colour_bar(figure: Figure, paint: ScalarMappable, axes: Axes | list[Axes], 
     bar.ax.tick_params(labelsize=6)
     bar.ax.xaxis.set_major_formatter(_NUMBERS)
     bar.locator = MaxNLocator(4)
-    bar.set_label(labelled(label, "Pa"), fontsize=7.0)
+    bar.set_label(axis_label(label, "Pa"), fontsize=7.0)
 
 
 def _mesh_map(figure: Figure, axes: Axes, stress: WallStress, values: Array, label: str) -> None:

@@ -29,7 +29,7 @@ from dembark.common.files import write_atomic
 from .fields.coarse_graining import interpolate
 from .fields.field_set import FieldSet
 from .grains import GrainFrame
-from .plots import labelled, scalar
+from .plots import axis_label, scalar
 from .style import STYLE
 
 Array = NDArray[np.float64]
@@ -92,7 +92,7 @@ def field_scene(frame: GrainFrame, fields: FieldSet, name: str, axis: str = "y",
     filled &= np.moveaxis(np.arange(fields.grid.shape[right])[:, None, None] >= fields.grid.shape[right] // 2, 0, right)
     known, flat = (np.take(one, layer, axis=across).ravel() for one in (filled, values))
     grains = grain_scene(frame, sample(fields, name, frame.wrapped), keep=frame.wrapped[:, across] > at + frame.radii)
-    return Scene(grains.positions, grains.radii, grains.values, labelled(label, unit), corners[known], flat[known])
+    return Scene(grains.positions, grains.radii, grains.values, axis_label(label, unit), corners[known], flat[known])
 
 
 def limits(scenes: Sequence[Scene]) -> tuple[float, float]:

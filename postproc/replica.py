@@ -79,7 +79,7 @@ class Replica:
             raise DumpError(f"{self.folder}: grains.dump has {len(grains)} frames, contacts.dump {len(contacts)}")
         for one, other in zip(grains, contacts, strict=True):
             if one.step != other.step:
-                raise DumpError(f"{self.folder}: step {one.step} of grains.dump has the place of step {other.step} of contacts.dump")
+                raise DumpError(f"{self.folder}: grains.dump has step {one.step} where contacts.dump has step {other.step}")
             yield one, other
 
     def mapped(self, work: Callable[[GrainFrame, ContactFrame], Measured]) -> Iterator[tuple[GrainFrame, Measured]]:

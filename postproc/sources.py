@@ -66,7 +66,7 @@ class Source:
     def walls(self, names: Sequence[str]) -> tuple[list[Wall], list[str]]:
         """Those walls of the run that carry one of `names`, as its record has them, and a line for each whose motion it does not know."""
         if names and "case" in self.record and "walls" not in self.record:
-            return [], ["the run's record says nothing of its walls, as those of earlier versions"]
+            return [], ["the run's record has no walls, for an earlier version wrote it"]
         known = {name: wall for name, wall in self.record.get("walls", {}).items() if name in names}
         moving = [name for name, wall in known.items() if wall.get("motion", "steady") != "steady"]
         return ([self._wall(name, wall) for name, wall in known.items() if name not in moving],
@@ -160,7 +160,7 @@ def select(source: Source, numbers: Sequence[int]) -> Selection:
     for number in numbers:
         if diameter := mean_diameter(frame := source.grains[number]):
             return Selection(source, numbers, frame, diameter[0])
-    raise DembarkError(f"there are no grains in frames {numbers[0]} to {numbers[-1]}", "those that are chosen",
+    raise DembarkError(f"there are no grains in frames {numbers[0]} to {numbers[-1]}", "which are the chosen ones",
                        "choose others with --frames")
 
 

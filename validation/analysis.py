@@ -18,7 +18,7 @@ _MISTAKES = (NameError, AttributeError, ImportError, TypeError)
 
 
 @contextmanager
-def warnings_kept() -> Iterator[list[str]]:
+def collected_warnings() -> Iterator[list[str]]:
     """A list that takes the numerical warnings of the block, as remarks with file and line, instead of the screen."""
     found: list[str] = []
     # The filters stay as they are: where a warning is to be an error, it is one.

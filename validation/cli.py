@@ -99,8 +99,8 @@ def run(
         raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
     measurement.load(one)
     planned = series(one, chosen, profile, engines.find(engine), changes)
-    if restart_interval is not None and not restarts.supported(planned.runs[0]):
-        raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no states to go on from",
+    if restart_interval is not None and not restarts.writes_restarts(planned.runs[0]):
+        raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no restart files",
                            "leave it out; see docs/how-to/restarts.md for what a deck needs")
     folder = (out or Path("results") / profile / planned.place).resolve()
     used = Resources(ranks, threads, restart_interval=interval)

@@ -62,7 +62,7 @@ def measure(folder: Path, wanted: int | None = None) -> Result:
 def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str) -> measurement_file.Measured:
     (folder / measurement_file.FILE).unlink(missing_ok=True)
     fields = ""
-    with analysis.warnings_kept() as warnings:
+    with analysis.collected_warnings() as warnings:
         found = measurement.measure(case, runs)
         if found.fields is not None:
             # Of the extra `fields`, which cases without fields do without.

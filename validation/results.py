@@ -20,7 +20,7 @@ import pandas as pd
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_atomic
-from dembark.common.lock import held
+from dembark.common.lock import is_held
 from dembark.validation.judge.result import COMPARISON, METRICS, PLAN, as_row, result_files
 
 RECORD = "run.json"
@@ -102,7 +102,7 @@ def state(folder: Path, place: str) -> State:
     for run in plan(folder).get("runs", ()):
         if run["folder"] == place:
             return _state(folder, run)
-    raise DembarkError(f"{place} is no planned run", f"of {folder / PLAN}", "submit again")
+    raise DembarkError(f"{place} is not a planned run", f"of {folder / PLAN}", "submit again")
 
 
 def _state(results: Path, run: Mapping[str, Any]) -> State:
@@ -119,7 +119,7 @@ def _state(results: Path, run: Mapping[str, Any]) -> State:
     if status.get("inputs") != run["inputs"]:
         status = {}
     known = {key: value for key, value in status.items() if key in _FIELDS} | facts
-    if lock_file(place).exists() and held(lock_file(place)):
+    if lock_file(place).exists() and is_held(lock_file(place)):
         return State(**known | {"state": "running", "message": ""})
     if known.get("state") == "running":
         known |= {"state": "stopped", "message": "its process was ended", "ended": known.get("began", 0.0)}
@@ -180,7 +180,7 @@ def _rows(folder: Path, kind: str) -> Iterator[dict[str, Any]]:
 def _existing(folder: Path | str) -> Path:
     path = Path(folder).resolve()
     if not path.is_dir():
-        raise DembarkError(f"{folder} is no folder", "", "give results/<profile>, the folder of a campaign, or that of a run")
+        raise DembarkError(f"{folder} is not a folder", "", "give results/<profile>, the folder of a campaign, or that of a run")
     return path
 
 

@@ -1,4 +1,4 @@
-"""The figure of the LCP solver is drawn from a stored measurement, with its data beside it."""
+"""The figure of the LCP solver is drawn from a stored measurement, with its data next to it."""
 
 from __future__ import annotations
 

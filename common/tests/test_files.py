@@ -1,4 +1,4 @@
-"""Output of engines is whole or refused; results are replaced whole or not at all."""
+"""Output of engines is complete or refused; results are replaced completely or not at all."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from dembark.common.errors import DembarkError, Interrupted
-from dembark.common.lock import Busy, held, lock
+from dembark.common.lock import Busy, is_held, lock
 
 TIMES = {"beat": 0.1, "dead_after": 0.6}
 HOLDER = ("import sys, time; from pathlib import Path; from dembark.common.lock import lock\n"
@@ -49,8 +49,8 @@ def test_it_is_exclusive_and_ends_with_its_block(tmp_path: Path) -> None:
     with lock(tmp_path / "a/l", "busy"), pytest.raises(Busy, match="busy"), lock(tmp_path / "a/l", "busy"):
         pass
     with lock(tmp_path / "a/l", "busy"):
-        assert held(tmp_path / "a/l")
-    assert not held(tmp_path / "a/l") and not held(tmp_path / "none")
+        assert is_held(tmp_path / "a/l")
+    assert not is_held(tmp_path / "a/l") and not is_held(tmp_path / "none")
 
 
 def test_it_ends_with_its_process(tmp_path: Path) -> None:
@@ -59,16 +59,16 @@ def test_it_ends_with_its_process(tmp_path: Path) -> None:
     began = time.monotonic()
     with pytest.raises(DembarkError, match="busy"), lock(tmp_path / "l", "busy"):
         pass
-    assert time.monotonic() - began < 5.0 and held(tmp_path / "l")
+    assert time.monotonic() - began < 5.0 and is_held(tmp_path / "l")
     process.kill()
     process.communicate()
-    assert not held(tmp_path / "l")
+    assert not is_held(tmp_path / "l")
     with lock(tmp_path / "l", "busy"):
         pass
 
 
 def test_that_of_a_live_process_of_another_host_is_respected(beating: Path) -> None:
-    assert held(beating, 0.6)
+    assert is_held(beating, 0.6)
     with pytest.raises(Busy, match="taken"), lock(beating, "taken", threading.Event(), **TIMES):
         pass
 
@@ -80,7 +80,7 @@ def test_that_of_a_dead_process_of_another_host_is_taken(tmp_path: Path) -> None
         assert "another-host" not in path.read_text() and not lost.is_set()
     elsewhere(path)
     os.utime(path, (time.time() - 10, time.time() - 10))
-    assert not held(path, 0.6)
+    assert not is_held(path, 0.6)
 
 
 def test_its_holder_learns_that_it_was_taken(tmp_path: Path) -> None:

@@ -103,14 +103,14 @@ def _avalanche(replicas: Replicas) -> Measurement:
         values["obstacle_impulse"] = Value(exact(worst.impulse[0]), exact(worst.impulse[1]))
     place, d = slope(replicas[0]), float(replicas[0].parameters["grain_diameter"])
     times = runs[0].times
-    curves = [profile("front", "Front", "time since the gate moves (s)", "way along the floor from the toe, over d", times,
+    curves = [profile("front", "Front", "time since the gate moves (s)", "distance along the floor from the toe, over d", times,
                       [np.interp(times, run.times, run.fronts) / d for run in runs],
                       reference=np.mean([np.interp(times, run.times, run.law) for run in runs], axis=0) / d,
                       reference_label="2√(gH cos θ) t + ½ g cos θ (tan θ − tan δ) t²")]
     edges = d * np.arange(-replicas[0].parameters["slope_length"], replicas[0].parameters["flat_length"] + 1.0, 4.0)
     tops = [[place.thickness(frame.select(frame.types == 1), edges) / d for frame in (frames[0], frames[len(frames) - 1])]
             for frames in (replica.grains() for replica in replicas)]
-    curves.append(profile("deposit", "Deposit", "way along the floor from the toe, over d", "solid volume over area, over d",
+    curves.append(profile("deposit", "Deposit", "distance along the floor from the toe, over d", "solid volume over area, over d",
                           0.5 * (edges[1:] + edges[:-1]) / d, [last for _, last in tops],
                           reference=np.mean([first for first, _ in tops], axis=0), reference_label="when the gate opens"))
     if "passed" in values:
@@ -157,7 +157,7 @@ def _single(replica: Replica) -> Measurement:
 
 
 def _way(times: Array, way: Array, reference: Array, label: str) -> Curve:
-    return profile("way", "Way of a single grain", "time (s)", "way along the floor, over d", times, [way], reference=reference,
+    return profile("way", "Distance of a single grain", "time (s)", "distance along the floor, over d", times, [way], reference=reference,
                    reference_label=label)
 
 

@@ -38,20 +38,20 @@ class Collapse:
     width: float
     diameter: float
 
-    def gained(self, name: str) -> Array:
+    def gain(self, name: str) -> Array:
         """Change of a column since the opening."""
         return self.rows[name][self.opening :] - self.rows[name][self.opening]
 
     @property
     def fallen(self) -> float:
         """J."""
-        return float(-self.gained("potential_energy")[-1])
+        return float(-self.gain("potential_energy")[-1])
 
     def lost_in(self, name: str) -> Array:
         """Share that this way has taken since the opening."""
         takers = {"friction": {"tangential_elastic": -1, "tangential_stored": -1}, "held": {"normal_stored": 1, "tangential_stored": 1},
                   "kinetic": {"kinetic_energy": 1}, "gate": {"walls": -1}, "potential": {"potential_energy": -1}}
-        return np.sum([sign * self.gained(column) for column, sign in takers.get(name, {name: -1}).items()], axis=0) / self.fallen
+        return np.sum([sign * self.gain(column) for column, sign in takers.get(name, {name: -1}).items()], axis=0) / self.fallen
 
     def potential_error(self, column: str = "potential_energy") -> float:
         """Largest difference between gravity's work since the first row and the potential energy lost, over the largest such work."""
@@ -85,7 +85,7 @@ def read(replica: Replica) -> Collapse:
 
 def shares(runs: Sequence[Collapse], ways: Mapping[str, str]) -> list[dict[str, Any]]:
     """Curves over time of the shares that `ways` have taken, by name with a title."""
-    times = [one.gained("time") for one in runs]
+    times = [one.gain("time") for one in runs]
     place = np.linspace(0.0, times[0][-1], 101)
     return [profile(name, title, "time since the gate moves (s)", "fraction of the potential energy lost", place,
                     [np.interp(place, time, one.lost_in(name)) for time, one in zip(times, runs, strict=True)])
@@ -133,7 +133,7 @@ def measure(replicas: Replicas) -> Measurement:
         "energy_balance": worst(lambda one: momentum.imbalance(one.rows, PARTS)),
         "potential_error": worst(Collapse.potential_error),
         "dissipation_sign": worst(Collapse.given_back),
-        "step_error": Value(over(lambda one: float(np.abs(one.gained("step_error")).max() / one.fallen))),
+        "step_error": Value(over(lambda one: float(np.abs(one.gain("step_error")).max() / one.fallen))),
         "height_error": Value(over(lambda one: one.potential_error("weight_height"))),
         **{f"{name}_share": share(name) for name in ways},
         "aspect_ratio": Value(aspect),

@@ -36,7 +36,7 @@ class Phases:
         return [frame for frame, own in zip(self.frames, self.phases, strict=True) if own == phase % PHASES]
 
     def displacements(self) -> Array:
-        """Ways (pairs, grains, 3) in m of all grains in one period, from each frame that has another a period later."""
+        """Displacements (pairs, grains, 3) in m of all grains in one period, from each frame that has another a period later."""
         places = np.array([frame.positions for frame in self.frames])
         return np.asarray(places[PHASES:] - places[:-PHASES])
 
@@ -62,7 +62,7 @@ def read_phases(frames: Iterable[GrainFrame], period_steps: int, time_step: floa
     return Phases(kept, numbers, period_steps * time_step)
 
 
-def binned(values: Array, places: Array, weights: Array, edges: Sequence[Array]) -> Array:
+def cell_means(values: Array, places: Array, weights: Array, edges: Sequence[Array]) -> Array:
     """Mean of `values` (n,) or (n, k), weighted by `weights` (n,), of what lies at `places` (n, d) in each cell between `edges` (d arrays,
     m): (cells..., k) or (cells...); NaN in empty cells."""
     table = np.asarray(values, float)

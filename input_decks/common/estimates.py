@@ -15,7 +15,7 @@ from dembark.postproc.statistics import combined
 
 def over_chaotic(values: Iterable[float]) -> Estimate:
     """Mean of one number from each run of a chaotic motion; a single run gives no interval."""
-    return over_replicas([Estimate(one, math.inf, "one run of a chaotic motion says nothing about its spread") for one in values])
+    return over_replicas([Estimate(one, math.inf, "one run of a chaotic motion does not show its spread") for one in values])
 
 
 def divided(found: Estimate, scale: float) -> Estimate:

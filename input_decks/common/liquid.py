@@ -10,7 +10,7 @@ from dembark.postproc.measurement import Array, Estimate, Replica, Value, block_
 
 
 def liquid_values(replicas: Sequence[Replica]) -> dict[str, Value]:
-    """`liquid_total`, change over the whole run; `bridge_count` a grain and the part `liquid_in_bridges` over its second half. None when
+    """`liquid_total`, change over the run; `bridge_count` a grain and the part `liquid_in_bridges` over its second half. None when
     bridges have volumes of their own."""
     if not float(replicas[0].parameters.get("liquid_content") or 0.0) > 0.0:
         return {}
@@ -22,8 +22,7 @@ def liquid_values(replicas: Sequence[Replica]) -> dict[str, Value]:
 
     return {
         "liquid_total": Value(exact(max(float(np.abs(total / total[0] - 1.0).max()) for total in totals)), exact(0.0),
-                              detail=f"on grains, in bridges, on walls and lost; {totals[0][0]:.4g} m³ at the start, over the "
-                                     "whole run"),
+                              detail=f"on grains, in bridges, on walls and lost; {totals[0][0]:.4g} m³ at the start"),
         "bridge_count": Value(late([times["bridge_count"] / grains for times in tables])),
         "liquid_in_bridges": Value(late([times["liquid_bridges"] / total for times, total in zip(tables, totals, strict=True)])),
     }

@@ -92,7 +92,7 @@ def read_touches(path: Path) -> list[TouchFrame]:
 
 @cached_per_replica
 def read(replica: Replica) -> LogRun:
-    """The whole run as arrays; DumpError when files do not fit together."""
+    """The complete run as arrays; DumpError when files do not fit together."""
     frames, history = list(replica.grains()), replica.times()
     first, steps = frames[0], np.array([frame.step for frame in frames])
     if not np.array_equal(steps[1:], history["step"]):

@@ -45,7 +45,7 @@ def imbalance(rows: Rows, parts: Sequence[str] = PARTS) -> float:
     return float((left / rows["scale"]).max())
 
 
-def unexplained(rows: Rows) -> float:
+def unexplained_energy(rows: Rows) -> float:
     """Largest energy in a row of time.csv that no known force gave, over the energy turned over so far."""
     left = np.max([np.abs(rows[name]) for name in ("balance", "other", "imposed")], axis=0)
     return float((left / rows["scale"]).max())

@@ -26,7 +26,7 @@ def motion(p: Parameters, start: float | None = None, until: float | None = None
     measure.py. Raises ValueError with one line when this is no motion. In setup.py, `tables={"motion_words": motion(p).words}` gives it to
     the decks."""
     if p.motion == "table" and folder is None:
-        raise DembarkError("motion = table is nothing that this case knows", "its walls move otherwise", "take another motion")
+        raise DembarkError("motion = table is not possible in this case", "it reads no motion.csv", "take another motion")
     window: list[Word] = [word for name, time in (("start", start), ("until", until)) if time is not None for word in (name, time)]
     words = _words(p, point, window)
     return WallMotion(" ".join(str(word) if isinstance(word, str | int) else repr(float(word)) for word in words), folder)

@@ -54,7 +54,7 @@ def sites_within(p: Parameters, lines: Array, clear: tuple[float, float, float])
     gap = np.linalg.norm(places[:, None] - start - np.clip(share, 0.0, 1.0)[..., None] * along, axis=2).min(axis=1)
 
     def met(axis: int, sign: int) -> NDArray[np.bool_]:
-        """Whether a ray from each place along an axis meets a line; `sign`: which way."""
+        """Whether a ray from each place along an axis hits a line; `sign`: its direction."""
         other = 1 - axis
         crossed = (lines[:, 0, other] > places[:, None, other]) != (lines[:, 1, other] > places[:, None, other])
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -42,8 +42,8 @@ def suitable_step(p: Parameters, speed: float) -> float:
 
 def fixed_phases(frequency: float, time_step: float, start: float, periods: int, rows: int = 16) -> tuple[float, dict[str, int]]:
     """Time step (s), at most `time_step`, of which a whole number makes a period of the drive with `frequency` (Hz); and output steps.
-    Frames from the end of period `start` (made up to a whole one) on to the end of `periods` more, eight a period and the first one; `rows`
-    rows of time.csv from one frame to the next, over the whole run. `period_steps` are the steps of a period."""
+    Frames from the end of period `start` (rounded up) on to the end of `periods` more, eight a period and the first one; `rows`
+    rows of time.csv from one frame to the next, over the run. `period_steps` are the steps of a period."""
     every = math.ceil(1.0 / (frequency * time_step * PHASES * rows))
     stride = every * rows
     period, begun = stride * PHASES, math.ceil(start)

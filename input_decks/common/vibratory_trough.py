@@ -14,7 +14,7 @@ from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.statistics import combined, jackknife
 from dembark.postproc.studies import measured
 
-from .drive_phases import Phases, binned, read_phases
+from .drive_phases import Phases, cell_means, read_phases
 from .vibration import PHASES
 
 # Width of the cells of the velocity field, in mean diameters.
@@ -25,7 +25,7 @@ NOISE = 10
 BLOCKS = 5
 
 
-def about(places: Array, ways: Array) -> Array:
+def moment_about_y(places: Array, ways: Array) -> Array:
     """(r x u)_y of `places` r (..., 3) and `ways` u (..., 3)."""
     return np.asarray(places[..., 2] * ways[..., 0] - places[..., 0] * ways[..., 2])
 
@@ -41,7 +41,7 @@ def circulation(places: Array, ways: Array, masses: Array) -> Array:
 
     arm, way = relative(middle), relative(ways)
     square = arm[..., 0] ** 2 + arm[..., 2] ** 2
-    return np.asarray(np.einsum("n,...n->...", weights, about(arm, way)) / np.einsum("n,...n->...", weights, square))
+    return np.asarray(np.einsum("n,...n->...", weights, moment_about_y(arm, way)) / np.einsum("n,...n->...", weights, square))
 
 
 def fluctuation(places: Array, ways: Array, masses: Array, edges: Sequence[Array]) -> tuple[float, float]:
@@ -50,7 +50,7 @@ def fluctuation(places: Array, ways: Array, masses: Array, edges: Sequence[Array
     weights, flat = np.broadcast_to(masses, ways.shape[:2]).ravel(), ways.reshape(-1, ways.shape[-1])
     cells = tuple(np.clip(np.searchsorted(edge, column, side="right") - 1, 0, len(edge) - 2)
                   for edge, column in zip(edges, places.reshape(flat.shape).T, strict=True))
-    own = binned(flat, places.reshape(flat.shape), weights, edges)[cells]
+    own = cell_means(flat, places.reshape(flat.shape), weights, edges)[cells]
     off = np.average(((flat - own) ** 2).sum(axis=1), weights=weights)
     return math.sqrt(off), float(np.average(np.linalg.norm(own, axis=1), weights=weights))
 
@@ -103,7 +103,7 @@ class Trough:
         return block_mean(self.places[:, self.part, 2] - self.places[:, self.free, 2] @ (masses / masses.sum()))
 
     def likeness(self) -> float:
-        """How far the part's mean square way in a period is from that of the grains: logarithms, in standard deviations of the grains'."""
+        """Logarithm of the part's mean square displacement in a period less the mean of the grains', in standard deviations of these."""
         ways = self.run.displacements()
         logs = np.log(np.maximum((ways**2).sum(axis=2).mean(axis=0), 1e-300))
         return float((logs[self.part] - logs[self.free].mean()) / logs[self.free].std(ddof=1))
@@ -206,8 +206,8 @@ def drifts(runs: Sequence[Trough]) -> Curve:
         arm = one.places[:-PHASES][:, one.free] + 0.5 * ways
         arm = arm - arm.mean(axis=1, keepdims=True)
         distance = np.hypot(arm[..., 0], arm[..., 2])
-        along = about(arm, ways) / np.maximum(distance, 1e-300) / one.run.period
-        return binned(along.ravel(), distance.reshape(-1, 1), np.ones(along.size), [edges])
+        along = moment_about_y(arm, ways) / np.maximum(distance, 1e-300) / one.run.period
+        return cell_means(along.ravel(), distance.reshape(-1, 1), np.ones(along.size), [edges])
 
     return profile("drift", "Drift round the bed's centre", "distance from the centre (d)", "m/s, positive from z to x",
                    0.5 * (edges[1:] + edges[:-1]) / runs[0].diameter, [drift(one) for one in runs])

@@ -21,6 +21,6 @@ def wall_layers(p: Parameters) -> int:
     return math.ceil(2.0 * p.smoothing)
 
 
-def whole(length: float, spacing: float) -> float:
+def full_spacings(length: float, spacing: float) -> float:
     """The length (m) as a whole number of spacings."""
     return round(length / spacing) * spacing

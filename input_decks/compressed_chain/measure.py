@@ -96,7 +96,7 @@ def growth(phase: float) -> float:
 
 
 def bounce(power: float):  # type: ignore[no-untyped-def]
-    """Derivative of a grain of unit mass that meets the plane x = 0 with the force |x|^`power`."""
+    """Derivative of a grain of unit mass that hits the plane x = 0 with the force |x|^`power`."""
     return lambda _, y: [y[1], max(-y[0], 0.0) ** power]
 
 

@@ -22,7 +22,7 @@ MEASURED = Path(__file__).with_name("reference") / "fronts.csv"
 NAMES = {"martin_moyce": "Martin & Moyce (1952)", "koshizuka_oka": "Koshizuka & Oka (1996)"}
 # T from which points count, and the fewest with which a line is fitted.
 FREE, FEWEST = 1.0, 4
-NOWHERE = Estimate(math.nan, math.inf, "the front did not get there")
+NOWHERE = Estimate(math.nan, math.inf, "the front does not get so far")
 
 
 def published(source: str) -> tuple[Array, Array]:

@@ -79,16 +79,16 @@ def water(run: Replica) -> dict[str, float]:
         within = sum(int((np.abs(turn.inv().apply(places - centre)) < half - 0.5 * dx).all(axis=1).sum()) for centre, turn in poses)
         found["inside"] = max(found["inside"], float(within))
         if p["arrangement"] == "six" and FLOW[0] <= now <= FLOW[1]:
-            found["gap_filled"] = float(np.fmax(found["gap_filled"], filled(places, [centre for centre, _ in poses[:3]], half, dx)))
+            found["gap_filled"] = float(np.fmax(found["gap_filled"], gap_filling(places, [centre for centre, _ in poses[:3]], half, dx)))
         if np.isnan(found["floor_wetted"]) and now >= 1.5 - 0.5 * run.derived["stride"] * run.time_step:
-            found["floor_wetted"] = wetted(places, p["flume_width"], dx)
+            found["floor_wetted"] = wetted_share(places, p["flume_width"], dx)
     # Between frames; nan if it does not come.
     when, where = np.array(fronts).T
     found["arrival"] = reached(when, where, p["distance"])
     return found
 
 
-def filled(places: Array, centres: list[Array], half: float, dx: float) -> float:
+def gap_filling(places: Array, centres: list[Array], half: float, dx: float) -> float:
     """Volume of particles between neighbours of the lowest row, over that of the gaps; nan unless some are side by side along half an edge:
     a shorter gap is that of a few particles."""
     volume = water_there = 0.0
@@ -101,7 +101,7 @@ def filled(places: Array, centres: list[Array], half: float, dx: float) -> float
     return water_there / volume if volume > 0.0 else float("nan")
 
 
-def wetted(places: Array, width: float, dx: float) -> float:
+def wetted_share(places: Array, width: float, dx: float) -> float:
     """Part of the floor before the cubes with water on it, in squares of two spacings."""
     low = places[(places[:, 2] < 2.0 * dx) & (places[:, 0] > BARE[0]) & (places[:, 0] < BARE[1]) & (np.abs(places[:, 1]) < 0.5 * width)]
     shape = round((BARE[1] - BARE[0]) / (2.0 * dx)), round(width / (2.0 * dx))
@@ -113,7 +113,7 @@ def wetted(places: Array, width: float, dx: float) -> float:
 
 
 @cached_per_replica
-def moved(run: Replica) -> dict[str, float]:
+def cube_history(run: Replica) -> dict[str, float]:
     """What the history shows of the cubes and of energies; nan for what the run does not reach."""
     p, rows = run.parameters, run.times()
     cubes, top = p["arrangement"], int(run.derived["cube_count"])
@@ -169,14 +169,14 @@ def measure(replicas: Replicas) -> Measurement:
     cubes = p["arrangement"]
     late = "the run ends before 1.5 s"
     due = {"rise": 0.0, "inside": 0.0, "leaked": 0.0, "energy_growth": 0.0, "three_rms_x": 0.0, "six_rms_x": 0.0, "floor_wetted": 1.0}
-    missing = {"arrival": "the front did not come", "x_end": late, "floor_wetted": late, "half_fallen": "the run ends before",
+    missing = {"arrival": "the front does not reach the cubes", "x_end": late, "floor_wetted": late, "half_fallen": "the run ends before",
                "gap_filled": "the lowest cubes are not side by side while the flow passes"}
     of_water = ["arrival", "inside", "leaked", "overtopped", "floor_wetted"]
     # Into narrower gaps no particle gets.
     if cubes == "six" and p["gap"] >= p["spacing"]:
         due["gap_filled"] = 1.0
         of_water.append("gap_filled")
-    every = [{**moved(run), **{name: water(run)[name] for name in of_water}} for run in replicas]
+    every = [{**cube_history(run), **{name: water(run)[name] for name in of_water}} for run in replicas]
     if cubes in JUDGED:
         due["half_fallen"] = half_fallen(cubes, p["edge"])
     noisy = p["lattice_noise"] > 0.0 or p["cube_noise"] > 0.0

@@ -29,7 +29,7 @@ def material(k, c, friction):
                                         density=p.cube_density))
 
 
-def beside(one, both):
+def pair_part(one, both):
     """What gives `both` in series with `one`; hardly anything softer than `one` when that is too soft."""
     return one * both / max(one - both, 1e-3 * one)
 
@@ -37,9 +37,9 @@ def beside(one, both):
 k, c = 2.0 * p.stiffness, 2.0 * damping(p.restitution, 0.5 * p.cube_mass)
 largest = max(p.friction, p.floor_friction, p.wall_friction)
 face_material, corner_material = material(k, c, p.friction), material(k, c, largest)
-rim_material = material(beside(k, SHARE * p.stiffness), beside(c, DAMPED * 0.5 * c), largest)
-floor_material = material(k, beside(c, damping(p.floor_restitution, p.cube_mass)), p.floor_friction)
-glass = material(k, beside(c, damping(p.wall_restitution, p.cube_mass)), p.wall_friction)
+rim_material = material(pair_part(k, SHARE * p.stiffness), pair_part(c, DAMPED * 0.5 * c), largest)
+floor_material = material(k, pair_part(c, damping(p.floor_restitution, p.cube_mass)), p.floor_friction)
+glass = material(k, pair_part(c, damping(p.wall_restitution, p.cube_mass)), p.wall_friction)
 ends = (-inner, inner)
 corners = [(a, b, d) for a in ends for b in ends for d in ends]
 along = [inner * (0.2 * n - 1.0) for n in range(1, 10)]
@@ -56,7 +56,7 @@ for number, centre in enumerate(centres, 1):
     cube, _ = O.bodies.appendClumped([core, *balls])
     body = O.bodies[cube]
     if max(abs(part) for part in body.state.ori) < 1.0 - 1e-9 or (body.state.pos - Vector3(*centre)).norm() > 1e-9:
-        dembark.fail(f"cube {number} is turned or out of place when it is made: {body.state.pos}, {body.state.ori}")
+        dembark.fail(f"cube {number} is not where packing.data has it: {body.state.pos}, {body.state.ori}")
     body.state.mass, body.state.inertia = p.cube_mass, Vector3(1, 1, 1) * p.cube_inertia
     body.aspherical = False
     cubes[f"cube{number}"] = cube

@@ -24,7 +24,7 @@ STORED = ("normal_stored", "tangential_stored")
 FLIGHT = 0.01
 # Share of the steady value that counts as reached.
 REACHED = 0.9
-# From this acceleration on a sticking block flies for a whole period.
+# From this acceleration on a sticking block flies for a full period.
 LONGEST = math.sqrt(1.0 + math.pi**2)
 
 
@@ -58,7 +58,7 @@ def sticking_block(acceleration: float) -> Block | None:
 
 @dataclass(frozen=True)
 class Drive:
-    """One run: `rows`, the columns of time.csv, of which those at `ends` (periods + 1,) are at the ends of whole periods, the first when
+    """One run: `rows`, the columns of time.csv, of which those at `ends` (periods + 1,) are at the ends of full periods, the first when
     the plate begins to move, the last when the window ends; `steady`: number of periods before the measuring window; `weight` in N,
     `period` in s, `speed` V in m/s."""
 
@@ -69,7 +69,7 @@ class Drive:
     period: float
     speed: float
 
-    def gained(self, name: str) -> float:
+    def gain(self, name: str) -> float:
         """Gain of a column in the measuring window."""
         return float(self.rows[name][self.ends[-1]] - self.rows[name][self.ends[self.steady]])
 
@@ -83,11 +83,11 @@ class Drive:
 
     def power_gap(self) -> float:
         """Work of the plate's force times its velocity over that in the account, less 1."""
-        return self.gained("plate_work") / self.gained("walls") - 1.0
+        return self.gain("plate_work") / self.gain("walls") - 1.0
 
     def dissipation_gap(self) -> float:
         """Work of the walls over what contacts have taken in the window and do not hold, less 1."""
-        return self.gained("walls") / -sum(self.gained(name) for name in (*CONTACT_PARTS, *STORED)) - 1.0
+        return self.gain("walls") / -sum(self.gain(name) for name in (*CONTACT_PARTS, *STORED)) - 1.0
 
     def flight(self) -> Estimate:
         """Share of the time in which the force on the plate is below FLIGHT of the weight."""
@@ -133,14 +133,14 @@ class Drive:
 
 
 def read(replica: Replica) -> Drive:
-    """What was written; DumpError when the rows of time.csv do not make whole periods."""
+    """What was written; DumpError when the rows of time.csv do not make full periods."""
     rows, p, derived = replica.times(), replica.parameters, replica.derived
     began, period = int(derived["begin"]), int(derived["period_steps"])
     wanted = np.arange(began, int(derived["held"]) + 1, period)
     ends = np.searchsorted(rows["step"], wanted).astype(np.int64)
-    whole = len(wanted) > 1 and ends[-1] < len(rows["step"]) and (rows["step"][ends] == wanted).all()
-    if not whole or len(set(np.diff(ends))) > 1:
-        raise DumpError(f"{replica.folder}: time.csv has no rows at whole periods of {period} steps after step {began}")
+    complete = len(wanted) > 1 and ends[-1] < len(rows["step"]) and (rows["step"][ends] == wanted).all()
+    if not complete or len(set(np.diff(ends))) > 1:
+        raise DumpError(f"{replica.folder}: time.csv has no rows at full periods of {period} steps after step {began}")
     first = replica.grains()[0]
     angular = 2.0 * math.pi * p["motion_frequency"]
     return Drive(rows, ends, round((first.step - began) / period), float(first.masses.sum() * p["gravity"]), period * replica.time_step,

@@ -10,7 +10,7 @@ from dembark.input_decks.common.vibration import fixed_phases, highest_speed, su
 
 
 def setup(p: Parameters) -> Setup:
-    """The bed falls on the plate at rest, for whole periods; then the amplitude grows, stays, and falls again where that is asked for."""
+    """The bed falls on the plate at rest, for full periods; then the amplitude grows, stays, and with `rest_periods` falls again."""
     frequency, d_max = p.motion_frequency, packing.largest(p)
     still = math.ceil(p.settle_time * frequency)
     start = still + p.motion_ramp + p.run_in

@@ -21,7 +21,7 @@ def setup(p: Parameters) -> Setup:
     opened = math.floor((floor - p.column_width) / (speed * step))
     top = height + 2.0 * d_max
     bodies = packing.grains(p, sites, [(-d_max, floor + 4.0 * d), (0.0, p.column_depth), (-2.0 * d, top)])
-    bodies = bodies.joined(glued(p, floor), d, p.grain_density, 2)
+    bodies = bodies.joined(glued_places(p, floor), d, p.grain_density, 2)
     # The gate ends above the glued grains, which it would push; the gap lets no grain through.
     foot = 0.15 * d
     gate = strip((p.column_width, 0.0, foot), (0.0, 0.0, top - foot), p.column_depth)
@@ -29,7 +29,7 @@ def setup(p: Parameters) -> Setup:
     return Setup(output["steps"], step, bodies, {**numbers, **contacts(p, skin=0.4)}, {"gate": gate})
 
 
-def glued(p: Parameters, far: float) -> packing.Array:
+def glued_places(p: Parameters, far: float) -> packing.Array:
     """Places (n, 3) in m of the floor's grains from x = 0 to `far`: 1.1 d apart in the plane, tops up to d/10 off the level z = 0."""
     d = p.grain_diameter
     columns = int(p.column_depth / (1.1 * d))

@@ -35,7 +35,7 @@ def release():
         contact.phys.kineticFriction = p.wall_kinetic if at_wall else p.grain_kinetic
     for body in O.bodies:
         if isinstance(body.shape, Sphere):
-            # Velocities are half a step behind positions, and this step adds a whole one of gravity.
+            # Velocities are half a step behind positions, and this step adds a full step of gravity.
             body.state.vel += Vector3(0, 0, 0.5 * p.gravity * O.dt + p.start_velocity)
 
 

@@ -38,7 +38,7 @@ class Discharge:
     height: float
     period: float
 
-    def shifted(self) -> Array:
+    def times_from_low(self) -> Array:
         """Times since LOW of the mass has left."""
         return self.times - reached(self.times, self.share, LOW)
 
@@ -103,13 +103,13 @@ def measure(replicas: Replicas) -> Measurement:
               "bulk_density": Value(over_replicas([Estimate(run.density, math.inf, "one frame") for run in runs])),
               "fill_height": Value(exact(runs[0].height / given["outlet_width"]))}
     if not known:
-        place = runs[0].shifted()
+        place = runs[0].times_from_low()
         return Measurement(values, [profile("discharge", *TITLES, place, _mean(runs, place))])
     due = datum()
     worst = max((_difference(runs, name) for name in published()), key=lambda one: one.value)
     values |= {"rate": Value(rate, due["rate"], detail=compared(rate.value, due["rate"], sim=rate.half, num=0.0, input=0.0).text),
                "discharged": Value(last, due["discharged"]), "curve": Value(worst, exact(0.0))}
-    return Measurement(values, [_beside(runs, name) for name in published()])
+    return Measurement(values, [_with_published(runs, name) for name in published()])
 
 
 def _whole(share: float, run: Discharge) -> Estimate:
@@ -117,7 +117,7 @@ def _whole(share: float, run: Discharge) -> Estimate:
 
 
 def _mean(runs: Sequence[Discharge], times: Array) -> list[Array]:
-    return [np.interp(times, run.shifted(), run.share) for run in runs]
+    return [np.interp(times, run.times_from_low(), run.share) for run in runs]
 
 
 def _difference(runs: Sequence[Discharge], name: str) -> Estimate:
@@ -128,10 +128,10 @@ def _difference(runs: Sequence[Discharge], name: str) -> Estimate:
     return Estimate(float(apart.max()), READ, "digitisations")
 
 
-def _beside(runs: Sequence[Discharge], name: str) -> Curve:
+def _with_published(runs: Sequence[Discharge], name: str) -> Curve:
     t, y = published()[name]
     t = t - reached(t, y, LOW)
-    first = max(run.shifted()[0] for run in runs)
+    first = max(run.times_from_low()[0] for run in runs)
     t, y = t[t > first], y[t > first]
     return profile(f"discharge_{name}", *TITLES, t, _mean(runs, t), reference=y, reference_half=np.full(len(y), READ),
                    reference_label="Anand et al. (2008), DEM")

@@ -41,4 +41,4 @@ def measure(replicas: Replicas) -> Measurement:
     shares = ", ".join(f"{value:.4f}" for value in due / speed)
     return Measurement(values, row_curves(run, chain, motion), [
         (f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open meanwhile). All act at "
-         "the same time; a row of separate pairs would pass on the whole velocity.")])
+         "the same time; a row of separate pairs would pass on all of the velocity.")])

@@ -46,7 +46,7 @@ def loads(run: LogRun, walls: Sequence[int]) -> Loads:
     return Loads(on_walls, net, np.array([len(touch.forces) for touch in run.touches], float), mobilised)
 
 
-def beginning(run: LogRun, count: int) -> tuple[int, NDArray[np.int64], Array]:
+def before_impact(run: LogRun, count: int) -> tuple[int, NDArray[np.int64], Array]:
     """(frame, logs, impacts): the last frame before impact `count` + 1 begins, the logs of the first `count` impacts, and these by time."""
     order = run.impacts[np.lexsort((run.impacts[:, 1], run.impacts[:, 0], run.impacts[:, 2]))]
     until = order[count, 2] if len(order) > count else run.times[-1] + 0.5 * run.time_step
@@ -126,7 +126,7 @@ def first_impacts(run: LogRun) -> dict[str, Value]:
     """The state after the first impacts; what two engines may differ by is a share of the value, for velocities of the speed."""
     if not len(run.impacts):
         return {}
-    frame, logs, first = beginning(run, FIRST)
+    frame, logs, first = before_impact(run, FIRST)
 
     def rms(vectors: Array) -> float:
         return math.sqrt(float((vectors**2).sum(axis=1).mean()))

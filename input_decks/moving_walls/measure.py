@@ -46,7 +46,7 @@ class Contact:
         return float(2.87 * (self.mass**2 / (self.radius * self.modulus**2 * speed)) ** 0.2)
 
 
-def turned(places: Array, times: Array, rate: float, along: Array) -> tuple[Array, Array]:
+def heights_over_plate(places: Array, times: Array, rate: float, along: Array) -> tuple[Array, Array]:
     """Heights (times, n) in m of `places` (n, 3) over a plate, the plane z = 0 at the time 0, which turns about y with `rate` (rad/s) while
     the point of the axis that was the origin moves with the velocity `along` (3,) in m/s; and the speeds (times, n) in m/s with which the
     plate comes up to these places along its normal: n · (v + ω × r)."""
@@ -61,7 +61,7 @@ def turned(places: Array, times: Array, rate: float, along: Array) -> tuple[Arra
 
 def landings(count: int, place: Callable[[float], float], velocity: Callable[[float], float], gap: float, gravity: float,
              contact: Contact) -> list[tuple[float, float]]:
-    """Times (s) at which a point that falls from rest, `gap` (m) above a plate at `place(t)` (m) with `velocity(t)` (m/s), meets it, and
+    """Times (s) at which a point that falls from rest, `gap` (m) above a plate at `place(t)` (m) with `velocity(t)` (m/s), lands on it, and
     the speeds (m/s) with which. It goes with the plate for as long as an elastic contact lasts, and leaves it with the restitution."""
     found: list[tuple[float, float]] = []
     since, height, speed = 0.0, place(0.0) + gap, 0.0
@@ -81,7 +81,7 @@ def landings(count: int, place: Callable[[float], float], velocity: Callable[[fl
     return found
 
 
-def touched(times: Array, force: Array) -> Array:
+def touch_times(times: Array, force: Array) -> Array:
     """s: times at which `force` (n,) becomes positive."""
     begins = (force[1:] > 0.0) & ~(force[:-1] > 0.0)
     return times[1:][begins]
@@ -114,7 +114,7 @@ def _held(run: Replica) -> tuple[dict[str, float], list[Curve]]:
     p, law, (times, places, forces) = run.parameters, contact(run), _frames(run)
     if p["turning"]:
         along = np.array([run.derived[f"along_{axis}"] for axis in "xyz"])
-        height, speed = turned(places[0], times, p["turning"], along)
+        height, speed = heights_over_plate(places[0], times, p["turning"], along)
         due = law.force(law.radius - height, speed)
         found = np.linalg.norm(forces, axis=2)
         error = float(np.abs(found - due).max() / due.max())
@@ -149,7 +149,7 @@ def _bounce(run: Replica) -> tuple[dict[str, float], list[Curve]]:
     way = motion(SimpleNamespace(**p))
     due = landings(LANDINGS, lambda t: float(way.displacement(t)[2]), lambda t: float(way.velocity(t)[2]), run.derived["gap"],
                    p["gravity"], law)
-    found = touched(np.append(0.0, rows["time"]), np.append(0.0, rows["plate_fz"]))
+    found = touch_times(np.append(0.0, rows["time"]), np.append(0.0, rows["plate_fz"]))
     expected = np.array([time for time, _ in due])
     if len(found) < LANDINGS:
         return {}, []

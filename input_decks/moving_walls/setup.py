@@ -21,7 +21,7 @@ def setup(p: Parameters) -> Setup:
     """The plate is the plane z = 0; the vessel has a floor there, four walls and no lid."""
     stride = math.ceil(p.run_time / p.run_step / p.frames)
     every = {"held": stride, "bed": max(1, stride // 10), "bounce": 20}[p.scene]
-    moving, d = prescribed(p), p.grain_diameter
+    moving, d = wall_motion(p), p.grain_diameter
     places, speeds = {"held": _held, "bed": _bed, "bounce": _above}[p.scene](p)
     steps = stride * p.frames
     times = np.linspace(0.0, steps * p.run_step, 200)
@@ -36,19 +36,19 @@ def setup(p: Parameters) -> Setup:
     return Setup(steps, p.run_step, bodies, {**numbers, **contacts(p, skin=0.4)}, {"plate": mesh}, {"motion_words": moving.words})
 
 
-def prescribed(p: Parameters) -> WallMotion:
+def wall_motion(p: Parameters) -> WallMotion:
     """What the walls do."""
     if p.turning:
         way = " ".join(map(repr, ALONG))
         return WallMotion(f"rotation point 0.0 0.0 0.0 axis 0 1 0 rate {p.turning!r} uniform velocity {way}")
     if p.scene == "bed":
         speed = SPEED if p.reference_frame == "speed" else (0.0, 0.0, 0.0)
-        push = pushed(p) if p.reference_frame == "push" else (0.0, 0.0, 0.0)
+        push = vessel_acceleration(p) if p.reference_frame == "push" else (0.0, 0.0, 0.0)
         return WallMotion("uniform velocity " + " ".join(map(repr, speed)) + " acceleration " + " ".join(map(repr, push)))
     return motion(p)
 
 
-def pushed(p: Parameters) -> tuple[float, float, float]:
+def vessel_acceleration(p: Parameters) -> tuple[float, float, float]:
     """m/s^2, of the vessel."""
     return p.push_x, -2.0 / 3.0 * p.push_x, 0.5 * p.push_x
 
@@ -57,7 +57,7 @@ def pull(p: Parameters) -> tuple[float, float, float]:
     """m/s^2, on the grains: none on those that are held."""
     if p.scene == "held":
         return 0.0, 0.0, 0.0
-    x, y, z = pushed(p) if p.reference_frame == "tilt" else (0.0, 0.0, 0.0)
+    x, y, z = vessel_acceleration(p) if p.reference_frame == "tilt" else (0.0, 0.0, 0.0)
     return -x, -y, -p.gravity - z
 
 

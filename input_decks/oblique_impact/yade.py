@@ -1,11 +1,11 @@
-"""Oblique impact: spheres with several sets of inputs, each of which meets a plane. No gravity."""
+"""Oblique impact: spheres with several sets of inputs, each of which hits a plane. No gravity."""
 
 from yade import dembark
 
 p = dembark.parameters()
 O.dt = p.time_step
 count = len(p.restitutions)
-# Materials of the spheres of each set, then of its plane; a sphere meets the plane of its own set only, by their masks.
+# Materials of the spheres of each set, then of its plane; by their masks a sphere touches the plane of its own set only.
 materials = [O.materials.append(FrictMat(young=young, poisson=poisson, density=p.density))
              for young, poisson in zip(p.youngs_moduli, p.poisson_ratios, strict=True)]
 for kind, diameter, _, place, velocity, _ in dembark.packing():

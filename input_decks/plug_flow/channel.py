@@ -355,7 +355,7 @@ def frame_rows(grains: GrainFrame, contacts: ContactFrame, edges: Array, levels:
     heights, speed = free.positions[:, 2], -free.velocities[:, 2]
     shares = np.ones((len(heights), 1)) if periodic else slice_volumes(heights, free.radii, levels) / volume(free.radii)[:, None]
     parts = slice_volumes(free.positions[:, 0], free.radii, edges)
-    # Only contacts centred in the window: with its whole height as cross-section they make the mean stress of each cell.
+    # Only contacts centred in the window: with its full height as cross-section they make the mean stress of each cell.
     centre = contacts.first[:, 2] + 0.5 * contacts.branch[:, 2]
     inside = np.full(len(centre), True) if periodic else (centre >= levels[0]) & (centre < levels[-1])
     lines = (contacts.first[inside], contacts.branch[inside], contacts.forces[inside])

@@ -84,7 +84,7 @@ class Flow:
         return {name: values[self.inside, 0] for name, values in found.items()}
 
     def curves(self, sums: FieldSums) -> dict[str, Array]:
-        """The same (cells between the walls,) of `sums` over the whole height of the window."""
+        """The same (cells between the walls,) of `sums` over the full height of the window."""
         return {name: values[:, 0] for name, values in self.scaled(_whole_height(sums).fields(shear_corrected=True)).items()}
 
     def lagrangian(self) -> Array:

@@ -88,7 +88,7 @@ def _profiles(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="lower center", ncols=4, fontsize=6.8)
     caption = (
-        "The same across the channel, averaged over the whole height of the window, with 95 % intervals over time blocks. Full lines: "
+        "The same across the channel, averaged over the full height of the window, with 95 % intervals over time blocks. Full lines: "
         "Eulerian, momentum over mass in cells at rest; dotted: Lagrangian, displacements of single grains over the same time, smoothed "
         "with the same kernel."
     )

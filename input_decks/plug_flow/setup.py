@@ -22,14 +22,14 @@ def setup(p: Parameters) -> Setup:
     box = [(-d_max, p.channel_width + d_max), (0.0, p.channel_depth), (low, height + 2.0 * d_max)]
     bodies = packing.grains(p, sites, box)
     if rough:
-        bodies = bodies.joined(glued(p, low, height), p.grain_diameter, p.grain_density, 2)
+        bodies = bodies.joined(glued_places(p, low, height), p.grain_diameter, p.grain_density, 2)
     # The plate stops short of glued grains, which a mesh wall pushes in any group; the gap lets no grain through.
     ends = (0.62 * p.grain_diameter, p.channel_width - 0.62 * p.grain_diameter) if rough else box[0]
     plate = rectangle((ends[0], 0.0, 0.0), (ends[1] - ends[0], 0.0, 0.0), (0.0, p.channel_depth, 0.0))
     return Setup(steps["steps"], step, bodies, {**steps, **contacts(p, skin=0.3), "settle_steps": settle_steps}, {"plate": plate})
 
 
-def glued(p: Parameters, low: float, high: float) -> packing.Array:
+def glued_places(p: Parameters, low: float, high: float) -> packing.Array:
     """Places (n, 3) in m of the walls' grains, left and right in turn: 1.1 d apart in the wall's plane, up to d/10 off it."""
     columns, rise = int(p.channel_depth / (1.1 * p.grain_diameter)), 1.1 * p.grain_diameter
     first = math.ceil(low / rise - 0.5)

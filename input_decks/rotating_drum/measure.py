@@ -26,7 +26,7 @@ UNKNOWN = "the length of the other code's drum is not known"
 ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, "grain_diameter": 0.003}
 
 
-def tracked() -> tuple[Array, Array]:
+def tracked_profile() -> tuple[Array, Array]:
     """n (m), ascending, and speed (m/s) of the tracked points, without one that is out of line by 0.05 m/s."""
     rows = np.array(sorted((float(row["y"]), float(row["u"])) for row in reference_rows(HERE / "alizadeh_2013.csv", used="1")))
     return rows[:, 0], rows[:, 1]
@@ -40,7 +40,7 @@ def change_of_sign(n: Array, u: Array) -> float:
 
 def fluxes() -> tuple[float, float]:
     """m2/s: what the tracked layer returns, and what a bed that turns with the drum carries up below it. Equal if the profile is right."""
-    n, u = tracked()
+    n, u = tracked_profile()
     turn = change_of_sign(n, u)
     return (layer_flux(n, -u, turn, float(n[-1]))[0], 0.5 * ALIZADEH["drum_speed"] * (ALIZADEH["drum_radius"] ** 2 - turn**2))
 
@@ -48,7 +48,7 @@ def fluxes() -> tuple[float, float]:
 def data() -> dict[str, Estimate]:
     """The quantities of the tracked points, by the same definitions. U_D includes the change that would close the balance of mass: a faster
     layer, a deeper one, or less of the bed below it. Errors of scale or origin do not affect the shape of the profile."""
-    n, u = tracked()
+    n, u = tracked_profile()
     turn, top = change_of_sign(n, u), float(n[-1])
     returned, carried = fluxes()
     missing = carried / returned - 1.0
@@ -62,7 +62,7 @@ def data() -> dict[str, Estimate]:
             "layer_shape": shape}
 
 
-def unbalanced() -> str:
+def missing_balance() -> str:
     """Why the flow has no verdict."""
     returned, carried = fluxes()
     return (f"the tracked profile does not conserve mass: the layer returns {1e3 * returned:.2f}e-3 m²/s, a bed that turns with the drum "
@@ -88,7 +88,7 @@ def measure(replicas: Replicas) -> Measurement:
     values["froude"] = Value(exact(given["drum_speed"] ** 2 * given["drum_radius"] / given["gravity"]))
     if tracked_drum:
         for name, datum in data().items():
-            values[name] = Value(over[name], datum, reason="" if name == "layer_shape" else unbalanced(),
+            values[name] = Value(over[name], datum, reason="" if name == "layer_shape" else missing_balance(),
                                  detail=compared(over[name].value, datum, sim=over[name].half).text)
     if row := other_code().get(variant):
         values["centrifuging"] = Value(over["overhead"], exact(row["centrifuging"]))
@@ -110,7 +110,7 @@ def speeds(drums: list[DrumFlow], with_data: bool) -> Curve:
     title, along, across = "Speed along the free surface", "distance from the axis along the normal (m)", "u (m/s), positive with the drum"
     if not with_data:
         return profile("velocity", title, along, across, place, values)
-    n, u = tracked()
+    n, u = tracked_profile()
     inside = (n > place[0]) & (n < place[-1])
     return profile("velocity", title, along, across, n[inside], [np.interp(n[inside], place, one) for one in values], reference=u[inside],
                    reference_half=np.full(inside.sum(), SPEED_READ), reference_label="Alizadeh et al. (2013)")
@@ -137,7 +137,7 @@ def study(name: str, points: Points, along: str) -> Measurement:
         one = measured(middle, quantity)
         varied = {"input": half, "num": 0.0} if name == "friction" else {"input": 0.0, "num": half}
         values[quantity] = Value(Estimate(one.value, math.hypot(one.half, half), "scatter in time and effect of the varied parameter"),
-                                 datum[quantity], reason="" if quantity == "layer_shape" else unbalanced(),
+                                 datum[quantity], reason="" if quantity == "layer_shape" else missing_balance(),
                                  detail=compared(one.value, datum[quantity], sim=one.half, **varied).text)
     curves = [profile(quantity, quantity.replace("_", " "), along, quantity, places,
                       [np.array([measured(point, quantity).value for point in points])]) for quantity in FLOW]

@@ -19,7 +19,7 @@ def setup(p: Parameters) -> Setup:
     # Grains at the end walls have room for their shift, too.
     room, margin = (0.6 * d_max, d_max) if closed else (0.0, 0.0)
     box = [(-half, half), (-half, half), (-margin, p.drum_depth + margin)]
-    sites = close_packed(inside, p.drum_depth, 1.15 * d_max, room)
+    sites = close_packing(inside, p.drum_depth, 1.15 * d_max, room)
     bodies = packing.grains(p, sites, box)
     if lined:
         bodies = bodies.joined(lining(p), p.grain_diameter, p.grain_density, 2)
@@ -28,7 +28,7 @@ def setup(p: Parameters) -> Setup:
     return Setup(steps["steps"], step, bodies, {**steps, **contacts(p), "shell_radius": shell}, meshes)
 
 
-def close_packed(radius: float, depth: float, spacing: float, room: float = 0.0) -> packing.Array:
+def close_packing(radius: float, depth: float, spacing: float, room: float = 0.0) -> packing.Array:
     """Points (n, 3) in m within `radius` (m) of the z axis, which are at least `spacing` (m) apart, with the period `depth` (m) along z;
     or, with `room` (m), that far or farther from the ends z = 0 and z = `depth`. Layers of a face-centred lattice: stretched along z to
     fit, or compressed along z and stretched across, whichever holds more."""

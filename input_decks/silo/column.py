@@ -76,7 +76,7 @@ class Column:
 
     @property
     def weight(self) -> float:
-        """Specific weight rho_b g, the whole mass over the volume up to the surface."""
+        """Specific weight rho_b g, all mass over the volume up to the surface."""
         return self.mass * self.gravity / (self.vessel.area * self.height)
 
     @property
@@ -110,7 +110,7 @@ class Column:
         return values[frames][:, :, sectors].sum(axis=2).mean(axis=0) * (len(sectors) / sectors.sum())
 
     def stress_ratio(self, frames: Mask, sectors: Mask) -> float:
-        """K. The balance stress is that of the whole column: it is known, and no sector has one of its own."""
+        """K. The balance stress is that of the full column: it is known, and no sector has one of its own."""
         return float(self.wall(self.normal, frames, sectors)[self.bulk].sum() / self.balance(frames)[self.bulk].sum())
 
     def contact_ratio(self, frames: Mask, sectors: Mask) -> float:

@@ -20,4 +20,4 @@ def measure(replicas: Replicas) -> Measurement:
 
 def study(name: str, points: Points, _along: str) -> Measurement:
     """How much friction the walls mobilise, or the apparent masses of all `points` but `dry`, which they are predicted from."""
-    return quantities.mobilised(points) if name == "mobilisation" else quantities.predicted(points)
+    return quantities.mobilisation(points) if name == "mobilisation" else quantities.base_prediction(points)

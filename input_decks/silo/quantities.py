@@ -84,7 +84,7 @@ def scalars(one: Column) -> dict[str, Estimate]:
     }
 
 
-def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
+def base_prediction(points: Sequence[Mapping[str, Any]]) -> Measurement:
     """The force on the base of cylinders of other fillings or radii (results `points`), predicted from that of the variant `dry`, and K mu
     fitted to them. Of `dry` come K of the contact stress, mobilised friction and bulk density; of the others filled mass and radius."""
     known = next(point for point in points if point["variant"] == "dry")
@@ -124,7 +124,7 @@ def predicted(points: Sequence[Mapping[str, Any]]) -> Measurement:
     return Measurement(values, [curve], [remark])
 
 
-def mobilised(points: Sequence[Mapping[str, Any]]) -> Measurement:
+def mobilisation(points: Sequence[Mapping[str, Any]]) -> Measurement:
     """How much of its kinetic friction the wall mobilises, over the static friction of the wall, which the results `points` differ in."""
     points, place = ordered(points, "wall_friction")
     kinetic = place * np.array([point["parameters"]["kinetic_friction_ratio"] for point in points], float)
@@ -169,7 +169,7 @@ def _remarks(columns: Sequence[Column], over: Mapping[str, Estimate], wet: bool,
     measured, predicted, own = (over[name].value for name in ("apparent_mass_ratio", "_base_predicted", "_base_mobilised"))
     share = f"{mobilised / kinetic:.0%} of its kinetic" if kinetic > 0.0 else "no"
     judged = ("Janssen's law with the kinetic friction is a reference for the force on the base." if mobilised >= MOBILISED * kinetic > 0.0
-              else "Janssen's law with the kinetic friction is no reference here; along a wall with less friction, or where they resist "
+              else "Janssen's law with the kinetic friction is not a reference here; along a wall with less friction, or where they resist "
                    "rolling, all grains slide.")
     remarks = [
         (f"The wall mobilises {share} friction (μ_mob = {mobilised:.3f}; static {static:g}, kinetic {kinetic:g}): "

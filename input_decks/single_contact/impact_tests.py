@@ -53,7 +53,7 @@ def restitutions(one: Impacts, flight: Flight, known: Solutions) -> Found:
         ("restitution_error", "Its error", "prescribed e", "1000 (measured e − e)", asked, 1e3 * (found - asked), 0.0 * asked, "0")])
 
 
-def mirrored(one: Impacts, flight: Flight, known: Solutions) -> Found:
+def mirror_symmetry(one: Impacts, flight: Flight, known: Solutions) -> Found:
     """The points of contact of mirror images do not slide on each other: nothing turns."""
     after, before, asked = flight.after.numbers(one), one.radius[0] * one.spin[0] / one.closing, one.restitution
     k, spin = worst(np.abs(after["restitution"] - asked)), one.spin[0]

@@ -8,7 +8,7 @@ import numpy as np
 
 from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
 
-from .impact_tests import head_on, mirrored, oblique, restitutions
+from .impact_tests import head_on, mirror_symmetry, oblique, restitutions
 from .impacts import Flight, Solutions, impacts, read, sweep
 from .published_curves import with_published
 
@@ -37,6 +37,6 @@ def measured(p: Numbers, flight: Flight) -> Measurement:
     elif p["sweep"] == "restitution":
         more, curves = restitutions(one, flight, known)
     else:
-        more, curves = (mirrored if one.spin.any() else head_on)(one, flight, known)
+        more, curves = (mirror_symmetry if one.spin.any() else head_on)(one, flight, known)
     return Measurement(values | more, curves,
                        [f"{one.duration.min() / p['time_step']:.0f} steps from touch to release in the shortest impact, by Hertz's law."])

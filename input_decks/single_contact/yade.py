@@ -1,4 +1,4 @@
-"""Single contact: spheres of two materials, each of which meets a plane or a sphere of its own. No gravity."""
+"""Single contact: spheres of two materials, each of which hits a plane or a sphere of its own. No gravity."""
 
 from yade import dembark
 
@@ -10,7 +10,7 @@ materials = [O.materials.append(FrictMat(young=young, poisson=poisson, density=d
              for young, poisson, density in zip(p.youngs_moduli, p.poisson_ratios, p.densities, strict=False)]
 partners = materials[2 * levels:]
 for kind, diameter, _, place, velocity, spin in dembark.packing():
-    # A sphere meets those of its own mask only: A or B.
+    # A sphere touches those of its own mask only: A or B.
     m = (kind - 1) // levels if kind <= 2 * levels else kind - 1 - 2 * levels
     sphere = utils.sphere(place, 0.5 * diameter, material=O.materials[materials[kind - 1]], mask=1 << m)
     sphere.state.vel, sphere.state.angVel = velocity, spin

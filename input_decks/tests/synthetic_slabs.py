@@ -63,7 +63,7 @@ def gravity_channel(results: Path, *, cells: int = 20, variant: str = "w20", rep
                     decay: float = 1.5, noise: float = 0.02, friction: float = 1.0, acceleration: float = 0.0, drift: float = 0.0,
                     swing: float = 0.2, seed: int = 0) -> Path:
     """Write a replica with u = u_max - (u_max - u_slip) exp(-(distance - d/2) / (decay d)), velocities over sqrt(g W), W = `cells` d.
-    `friction`: mean friction of the walls over the weight; `acceleration` (over g): the whole flow's; `drift`: relative growth of the
+    `friction`: mean friction of the walls over the weight; `acceleration` (over g): that of the flow; `drift`: relative growth of the
     kinetic energy over the window; `swing`: standard deviation of the friction's rows over its mean. Returns the engine's folder."""
     random = np.random.default_rng(seed)
     width, depth, length = cells * DIAMETER, 5 * DIAMETER, 5 * DIAMETER

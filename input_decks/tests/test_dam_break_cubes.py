@@ -136,7 +136,7 @@ def test_cubes_that_part_have_no_gap() -> None:
     lattice = np.stack([part.ravel() for part in np.meshgrid(*axes, indexing="ij")], axis=1)
     for ahead, gap in ((0.0, True), (0.07, True), (0.08, False)):
         centres = [np.array([1.775 + ahead * (k != 0), 0.2 * k, 0.075]) for k in (-1, 0, 1)]
-        assert np.isfinite(dam.filled(lattice, centres, 0.075, 0.0125)) == gap
+        assert np.isfinite(dam.gap_filling(lattice, centres, 0.075, 0.0125)) == gap
 
 
 def test_springs_stop_a_corner_that_lands_within_its_rounding() -> None:

@@ -1,4 +1,4 @@
-"""Frames by the phase of a drive: known motions are measured as they are, and windows that are not whole are refused."""
+"""Frames by the phase of a drive: known motions are measured as they are, and incomplete windows are refused."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dembark.input_decks.common.drive_phases import binned, read_phases
+from dembark.input_decks.common.drive_phases import cell_means, read_phases
 from dembark.input_decks.common.vibration import PHASES
 from dembark.postproc import DumpError, GrainsDump
 from dembark.postproc.tests.dumps import grains_text
@@ -37,7 +37,7 @@ def test_frames_are_sorted_by_phase_and_the_shaking_cancels(tmp_path: Path) -> N
 
 def test_cell_means_are_weighted() -> None:
     place, edges = np.array([[0.1], [0.2], [0.7]]), [np.array([0.0, 0.5, 1.0])]
-    np.testing.assert_allclose(binned(np.array([1.0, 4.0, 7.0]), place, np.array([2.0, 1.0, 1.0]), edges), [2.0, 7.0])
+    np.testing.assert_allclose(cell_means(np.array([1.0, 4.0, 7.0]), place, np.array([2.0, 1.0, 1.0]), edges), [2.0, 7.0])
 
 
 @pytest.mark.parametrize(("change", "message"), [

@@ -150,7 +150,7 @@ def test_a_bed_that_bounces_is_not_compared_with_a_block_that_sticks() -> None:
 def test_rows_that_make_no_periods_are_refused() -> None:
     run = shaken()
     run.derived["period_steps"] += 1
-    with pytest.raises(DumpError, match="no rows at whole periods"):
+    with pytest.raises(DumpError, match="no rows at full periods"):
         verdicts(run)
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dembark.input_decks.common.log_run import LogRun, TouchFrame, read_touches
-from dembark.input_decks.log_pile.measure import beginning, impact_values, loads, together
+from dembark.input_decks.log_pile.measure import before_impact, impact_values, loads, together
 from dembark.input_decks.tests.measuring import Control, defaults, judged, logs, module, names
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Estimate, Value, number
@@ -174,11 +174,11 @@ def test_rough_stakes_may_carry_a_part_of_the_weight():
 
 def test_the_beginning_is_the_state_before_the_eleventh_impact():
     run = stack()
-    frame, logs, first = beginning(run, 10)
+    frame, logs, first = before_impact(run, 10)
     assert logs.tolist() == [0, 1] and len(first) == 10
     assert run.times[frame] < run.impacts[10, 2] <= run.times[frame + 1]
     shuffled = replace(run, impacts=run.impacts[::-1])
-    assert beginning(shuffled, 10)[0] == frame
+    assert before_impact(shuffled, 10)[0] == frame
 
 
 def test_loads_are_the_sums_of_the_contacts():

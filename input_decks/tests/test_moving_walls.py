@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.common.motion import motion
-from dembark.input_decks.moving_walls.measure import Contact, landings, turned
+from dembark.input_decks.moving_walls.measure import Contact, heights_over_plate, landings
 from dembark.input_decks.tests.measuring import Control, Verdicts, defaults, judged, module, names
 from dembark.postproc.tests.packings import frame_of
 from dembark.validation.case.folders import find
@@ -51,8 +51,8 @@ def strip(arm: float = 1.0) -> Verdicts:
     p = parameters("strip")
     run = replica("strip", [], {}, 1e-5)
     law, places, times = walls.contact(run), np.array([[-0.01, 0.0, 0.0022], [0.012, 0.004, 0.0022]]), 1e-5 * np.arange(0, 2000, 50)
-    height, _ = turned(places, times, p["turning"], ALONG)
-    _, speed = turned(arm * places, times, p["turning"], ALONG)
+    height, _ = heights_over_plate(places, times, p["turning"], ALONG)
+    _, speed = heights_over_plate(arm * places, times, p["turning"], ALONG)
     push = law.force(law.radius - height, speed)
     frames = [frame(places, 50 * k, forces=[[0.0, 0.0, f] for f in row]) for k, row in enumerate(push)]
     derived = {f"along_{axis}": speed for axis, speed in zip("xyz", ALONG, strict=True)}

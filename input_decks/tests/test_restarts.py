@@ -221,7 +221,7 @@ def test_harness_resumes_what_was_ended_from_outside(engine: str, number: int, t
         time.sleep(0.01)
     os.kill(engine_in(work), number)
     thread.join(60)
-    assert len(caught) == 1 and "it goes on from step" in str(caught[0])
+    assert len(caught) == 1 and "it continues from step" in str(caught[0])
     assert simulate(one, tmp_path, threading.Event(), used)
     folder = tmp_path / "replica-1"
     record = read_json(folder / "run.json")

@@ -64,7 +64,7 @@ def test_a_wave_shows_above_noise_and_has_its_mean_length() -> None:
 def test_a_layer_that_jumps_as_a_whole_is_no_wave() -> None:
     jump = 0.5 * np.cos(np.pi * np.arange(16 * PHASES) / PHASES)[:, None] + np.zeros(CELLS)
     one = Waves(D * (5.0 + jump), LENGTH, D)
-    assert amplitude(one.doubling()) == pytest.approx(math.sqrt(2.0) * 0.5) and one.line(0.5).sum() < 1e-25
+    assert amplitude(one.doubling_power()) == pytest.approx(math.sqrt(2.0) * 0.5) and one.line(0.5).sum() < 1e-25
 
 
 def test_too_few_frames_are_refused() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.common.drive_levels import levels
-from dembark.input_decks.common.momentum import unexplained
+from dembark.input_decks.common.momentum import unexplained_energy
 from dembark.input_decks.common.vibration import PHASES
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.input_decks.vibrated_layer.layer import read
@@ -196,7 +196,7 @@ def test_the_plate_goes_from_level_to_level(engine: str, simulate: Any) -> None:
         inside = (rows["time"] > begin) & (rows["time"] < end)
         expected = level.gamma * 9.81 / (2.0 * math.pi * 25.0) ** 2
         assert rows["motion_z"][inside].max() == pytest.approx(expected, rel=1e-3), level
-    assert unexplained(rows) < 1e-10 and rows["walls"][-1] > 0.0
+    assert unexplained_energy(rows) < 1e-10 and rows["walls"][-1] > 0.0
     last = list(run.grains())[-1]
     assert len(last.ids) > 50
     assert last.positions[:, 2].min() > rows["motion_z"][-1]
@@ -205,7 +205,7 @@ def test_the_plate_goes_from_level_to_level(engine: str, simulate: Any) -> None:
 @pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 def test_blocked_grains_do_not_turn(engine: str, simulate: Any) -> None:
     run = simulate("vibrated_layer", engine, SMALL | {"spins": "blocked", "levels": 1, "last_gamma": None})
-    assert all((frame.omegas == 0.0).all() for frame in run.grains()) and unexplained(run.times()) < 1e-10
+    assert all((frame.omegas == 0.0).all() for frame in run.grains()) and unexplained_energy(run.times()) < 1e-10
 
 
 def test_a_floor_of_strips_is_refused_where_facets_have_no_periods(decks: Any, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.common.momentum import unexplained
+from dembark.input_decks.common.momentum import unexplained_energy
 from dembark.input_decks.common.vibration import PHASES
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.validation.case import deck
@@ -97,7 +97,7 @@ def test_the_vessel_moves_as_a_whole_and_keeps_its_grains(engine: str, simulate:
     """Monolayers stay in their plane, and all work is accounted for."""
     run = simulate("vibro_mixing", engine, {"grain_count": 60, "vessel_width": 0.05, "settle_time": 0.1, "motion_ramp": 2, "periods": 10,
                                             "mixture": "intruder", "motion_frequency": 20.0})
-    assert unexplained(run.times()) < 1e-10
+    assert unexplained_energy(run.times()) < 1e-10
     for frame in run.grains():
         # To the bit: round-off grows, and in a minute's run grains leave their plane.
         assert len(frame.ids) == 60 and np.ptp(frame.positions[:, 1]) == 0.0 and (frame.velocities[:, 1] == 0.0).all()
@@ -109,10 +109,10 @@ def controls_vibro_mixing(_folder: Path) -> Iterator[Control]:
     right = verdicts()
     yield Control("a billionth of the works that nothing explains", right, verdicts(lost=1e-9))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mixing, "sampled", lambda frame, _: np.arange(len(frame)) % 7)
+        patch.setattr(mixing, "sample_numbers", lambda frame, _: np.arange(len(frame)) % 7)
         yield Control("samples of grains from everywhere", right, verdicts())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mixing, "shuffled", lambda _, kinds: kinds)
+        patch.setattr(mixing, "random_labels", lambda _, kinds: kinds)
         yield Control("labels that follow the place", right, verdicts(swaps=0))
     weak = {"swaps": 0, "mixture": "two_sizes", "motion_gamma": 0.8}
     yield Control("large grains that rise in a vessel that never throws them", verdicts(**weak), verdicts(**weak, rising=0.02))

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from scipy.stats import spearmanr
 
-from dembark.input_decks.common.momentum import unexplained
+from dembark.input_decks.common.momentum import unexplained_energy
 from dembark.input_decks.common.power_law import ordered
 from dembark.input_decks.common.vibration import PHASES
 from dembark.postproc.measurement import Curve, Estimate, Measurement, Numbers, Points, Replicas, Value, exact, over_replicas, profile
@@ -64,7 +64,7 @@ def measure(replicas: Replicas) -> Measurement:
     """Of one level its waves, of several the onset; profiles and the diagram of space and time of the first replica."""
     runs, p = [read(replica) for replica in replicas], replicas[0].parameters
     gammas = [one.gamma for one in runs[0].levels]
-    values = {"energy_balance": Value(exact(max(unexplained(one.rows) for one in runs)), exact(0.0)),
+    values = {"energy_balance": Value(exact(max(unexplained_energy(one.rows) for one in runs)), exact(0.0)),
               "acceleration": Value(exact(max(gammas))),
               "plate_speed": Value(exact(replicas[0].derived["plate_speed"] / math.sqrt(p["gravity"] * p["grain_diameter"])))}
     coherent = [Estimate(max(waves.coherence() for waves in one.waves), math.inf, "a level has no interval") for one in runs]
@@ -88,7 +88,7 @@ def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
         "wave_amplitude": Value(over_replicas([wave_amplitude(one.waves[0]) for one in runs])),
         "harmonic_amplitude": Value(over(lambda waves: amplitude(waves.harmonic()))),
         "noise_amplitude": Value(over(lambda waves: amplitude(float(waves.noise().sum())))),
-        "doubling_amplitude": Value(over(lambda waves: amplitude(waves.doubling()))),
+        "doubling_amplitude": Value(over(lambda waves: amplitude(waves.doubling_power()))),
     }
     if gamma <= FLAT:
         return values | {"flat_peak": Value(exact(mean(Waves.peak)), exact(1.0))}
@@ -190,7 +190,7 @@ def shifts(points: Points) -> Measurement:
     by_name = {one["variant"]: measured(one, "onset") for one in points
                if any(quantity["name"] == "onset" and quantity["value"] is not None for quantity in one["quantities"])}
     if PLAIN not in by_name:
-        return Measurement({}, remarks=["The plain layer shows no onset: nothing can be said of shifts."])
+        return Measurement({}, remarks=["The plain layer shows no onset, so shifts of the onset are unknown."])
     values, seen = {}, []
     for variant, label in CHANGES.items():
         if variant not in by_name:

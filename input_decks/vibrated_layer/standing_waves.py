@@ -121,8 +121,8 @@ class Waves:
         """Power at f of all modes from 1 on."""
         return float(self.line(1.0, keep).sum())
 
-    def doubling(self, keep: Mask | slice = slice(None)) -> float:
-        """Power at f/2 of the mean height: of a layer that as a whole is thrown higher at every other stroke."""
+    def doubling_power(self, keep: Mask | slice = slice(None)) -> float:
+        """Power at f/2 of the mean height: of a layer that is thrown higher at every other stroke."""
         return float(self.power[keep][:, 0, WINDOW // 2].mean())
 
     def mode(self, keep: Mask | slice = slice(None)) -> int:

@@ -72,7 +72,7 @@ def driven(p: Parameters, moving: WallMotion, start: float) -> tuple[float, floa
 
 
 def drive(p: Parameters) -> Parameters:
-    """The parameters of the motion that `drive_sense` asks for; a table has its own."""
+    """The parameters of the motion for `drive_sense`; a table has its own."""
     if p.motion == "table":
         return p
     own = {"motion": "circular", "motion_sense": p.drive_sense} if p.drive_sense else {"motion": "harmonic", "motion_direction": "z"}

@@ -47,7 +47,7 @@ def measure(replicas: Replicas) -> Measurement:
 
     values = {
         "energy_balance": Value(exact(np.max([imbalance(one.rows, CONTACT_PARTS) for one in runs])), exact(0.0)),
-        "touch_balance": Value(exact(max(missed(*pair) for pair in zip(runs, records, strict=True))), exact(0.0)),
+        "touch_balance": Value(exact(max(impulse_gap(*pair) for pair in zip(runs, records, strict=True))), exact(0.0)),
         "impact_rate": over([one.rate() for one in records]), "impact_energy": over([one.energy() for one in records], unit),
         "friction_power": over([one.friction() for one in records]), "circulation": over([one.turning() for one in runs], drive),
         "power": over([one.power(*WALLS) for one in runs]), "noise": of_run(lambda one: one.noise("trough")),
@@ -56,7 +56,7 @@ def measure(replicas: Replicas) -> Measurement:
     return Measurement(values, [vibratory_trough.drifts(runs), vibratory_trough.spectra(runs, "trough"), histogram(records, unit)])
 
 
-def missed(run: vibratory_trough.Trough, record: ContactRecord) -> float:
+def impulse_gap(run: vibratory_trough.Trough, record: ContactRecord) -> float:
     """Size of the difference between the impulse of the record and that of the force on the part, over the weight times the window."""
     whole = np.array([run.rows[f"part_j{axis}"][-1] - run.rows[f"part_j{axis}"][0] for axis in "xyz"])
     return float(np.linalg.norm(record.impulse() - whole) / (run.weight * run.periods * run.run.period))

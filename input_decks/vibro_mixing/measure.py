@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from dembark.input_decks.common.drive_levels import acceleration
 from dembark.input_decks.common.drive_phases import Phases, read_phases
 from dembark.input_decks.common.estimates import over_chaotic
-from dembark.input_decks.common.momentum import unexplained
+from dembark.input_decks.common.momentum import unexplained_energy
 from dembark.postproc.measurement import Curve, Measurement, Numbers, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.replica import Array, Replica, cached_per_replica
 
@@ -31,7 +31,7 @@ def measure(replicas: Replicas) -> Measurement:
     """What the mixture of the run has to show."""
     runs, p = [read(replica) for replica in replicas], replicas[0].parameters
     drift = over_replicas([wall_drift(one, 0.0, p["vessel_width"], p["grain_diameter"]) for one in runs])
-    values = {"energy_balance": Value(exact(max(unexplained(replica.times()) for replica in replicas)), exact(0.0)),
+    values = {"energy_balance": Value(exact(max(unexplained_energy(replica.times()) for replica in replicas)), exact(0.0)),
               "acceleration": Value(exact(acceleration(p))),
               "wall_drift": Value(drift)}
     if p["wall_friction"] == 0.0 and p["static_friction"] is None:
@@ -49,14 +49,14 @@ def measure(replicas: Replicas) -> Measurement:
 def equal(tracks: list[Array], diameter: float) -> tuple[dict[str, Value], list[Curve]]:
     """Mixing of the halves, and what labels make of the same places."""
     random = np.random.default_rng(0)
-    indices = {name: [np.array([lacey_index(lower_half(track[0, :, axis]), sampled(frame, diameter)) for frame in track])
+    indices = {name: [np.array([lacey_index(lower_half(track[0, :, axis]), sample_numbers(frame, diameter)) for frame in track])
                       for track in tracks] for axis, name in enumerate(("sides", "layers"))}
-    separated = [max(abs(lacey_index(lower_half(frame[:, axis]), sampled(frame, diameter))) for axis in (0, 1))
+    separated = [max(abs(lacey_index(lower_half(frame[:, axis]), sample_numbers(frame, diameter))) for axis in (0, 1))
                  for track in tracks for frame in track]
-    labels = [lacey_index(shuffled(random, lower_half(frame[:, 0])), sampled(frame, diameter))
+    labels = [lacey_index(random_labels(random, lower_half(frame[:, 0])), sample_numbers(frame, diameter))
               for track in tracks for frame in track for _ in range(20)]
     labelled = [segregation(kinds, frame[:, 1]) for track in tracks
-            for kinds in (shuffled(random, lower_half(track[0, :, 1])) for _ in range(LABELLINGS)) for frame in track]
+            for kinds in (random_labels(random, lower_half(track[0, :, 1])) for _ in range(LABELLINGS)) for frame in track]
     values = {"index_separated": Value(exact(float(np.mean(separated))), exact(0.0)),
               "index_random": Value(exact(float(np.mean(labels))), exact(1.0)),
               "segregation_labels": Value(exact(float(np.mean(labelled))), exact(0.0))}
@@ -66,12 +66,12 @@ def equal(tracks: list[Array], diameter: float) -> tuple[dict[str, Value], list[
     return values, [curve(f"index_{name}", f"Mixing of the {name}", "Lacey's index", found) for name, found in indices.items()]
 
 
-def shuffled(random: np.random.Generator, kinds: Kinds) -> Kinds:
+def random_labels(random: np.random.Generator, kinds: Kinds) -> Kinds:
     """As many labels of each kind, at random."""
     return random.permutation(kinds)
 
 
-def sampled(frame: Array, diameter: float) -> NDArray[np.int64]:
+def sample_numbers(frame: Array, diameter: float) -> NDArray[np.int64]:
     """Number of the sample (n,) of each of the places `frame` (n, 2): an even number of columns and rows, each with as many grains as the
     others, so that no sample lies in both halves."""
     return samples(frame, tuple(np.quantile(place, np.linspace(0.0, 1.0, 2 * max(1, round((len(edge) - 1) / 2)) + 1))

@@ -1,5 +1,5 @@
 """Mixing and segregation of grains of two kinds: Lacey's index, how far apart the kinds are in height, how fast either changes, and the
-drift at the walls that carries grains round. `kinds` (n,) is true for the grains of one kind; they may be of one material, told apart
+drift at the walls that carries grains round. `kinds` (n,) is true for the grains of one kind; they may be of one material, distinguished
 by where they once were."""
 
 from __future__ import annotations

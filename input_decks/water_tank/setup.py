@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from dembark.input_decks.common.setup import Parameters, Setup
-from dembark.input_decks.common.water import fluid_setup, wall_layers, whole
+from dembark.input_decks.common.water import fluid_setup, full_spacings, wall_layers
 
 SQUARE = ("floating", "falling", "drifting")
 
@@ -14,14 +14,14 @@ SQUARE = ("floating", "falling", "drifting")
 def setup(p: Parameters) -> Setup:
     """The tank is 0 < x < tank_right, y > 0, open above but for the box of the cylinder. A slot is in the middle of the floor."""
     dx, closed = p.spacing, p.scene == "cylinder"
-    right, depth = whole(p.tank_width, dx), whole(p.water_depth, dx)
+    right, depth = full_spacings(p.tank_width, dx), full_spacings(p.water_depth, dx)
     if p.scene == "slot" or p.scene in SQUARE:
         # As many particles left of the slot or block as right of it.
-        right = p.size + 2.0 * whole(0.5 * (p.tank_width - p.size), dx)
+        right = p.size + 2.0 * full_spacings(0.5 * (p.tank_width - p.size), dx)
     if p.scene == "drifting":
-        depth = p.size + 2.0 * whole(0.5 * (p.water_depth - p.size), dx)
+        depth = p.size + 2.0 * full_spacings(0.5 * (p.water_depth - p.size), dx)
     # A block begins a tenth of its side too high.
-    low = whole(p.water_depth - (p.body_density / p.fluid_density - 0.1) * p.size, dx)
+    low = full_spacings(p.water_depth - (p.body_density / p.fluid_density - 0.1) * p.size, dx)
     half, square = 0.5 * p.size, p.scene in SQUARE
     middle, body_y = 0.5 * right, {"floating": low + half, "falling": depth}.get(p.scene, 0.5 * depth)
     x, y = np.meshgrid((np.arange(round(right / dx)) + 0.5) * dx - middle, (np.arange(round(depth / dx)) + 0.5) * dx - body_y)
@@ -38,11 +38,12 @@ def setup(p: Parameters) -> Setup:
                                "body_inertia": mass * p.size**2 / 6.0, "load": 4.0 * mass * p.moved * dx / pushed**2}
     # A jet falls until the end.
     fall = 2.0 * math.sqrt(2.0 * p.gravity * depth) * p.run_time + 0.5 * p.gravity * p.run_time**2 if p.scene == "slot" else 0.0
-    thick, top = wall_layers(p) * dx, depth if closed else depth + whole(p.headroom, dx)
+    thick, top = wall_layers(p) * dx, depth if closed else depth + full_spacings(p.headroom, dx)
     if p.scene == "drifting":
-        room = whole(p.headroom, dx)
+        room = full_spacings(p.headroom, dx)
         return fluid_setup(p, (-room, right + room, -room, depth + room), spacing=dx, sound_speed=p.sound_speed, depth=depth,
                            filled_at_rest=1, tank_right=right, grain_count=x.size - int(within.sum()), **body)
-    return fluid_setup(p, (-thick, right + thick, -thick - whole(fall, dx), top + (thick if closed else whole(p.headroom, dx))),
+    above = thick if closed else full_spacings(p.headroom, dx)
+    return fluid_setup(p, (-thick, right + thick, -thick - full_spacings(fall, dx), top + above),
                        spacing=dx, sound_speed=p.sound_speed, depth=depth, filled_at_rest=1, tank_right=right, tank_top=top, thick=thick,
                        grain_count=x.size - int(within.sum()), **body)

@@ -39,12 +39,12 @@ class BinaryDump(Dump):
         """Open; DumpError for a missing, foreign or truncated file, or when the columns are not as many as are in it."""
         self._source = Source(Path(path))
         if any(self._source.begins_with(struct.pack("=q", -len(name)) + name) for name in _FOREIGN):
-            raise DumpError(f"{path} is a binary dump of a format that is not read; write a text dump")
+            raise DumpError(f"{path} is a binary dump in a format that cannot be read; write a text dump")
         try:
             with self._source.at(0) as handle:
                 width = self._words(handle).width
         except ValueError:
-            raise DumpError(f"{path} does not begin with 'ITEM: TIMESTEP', nor as a binary dump does") from None
+            raise DumpError(f"{path} is neither a text dump, which begins with 'ITEM: TIMESTEP', nor a binary one") from None
         if columns is None:
             advice = "give columns=, the words of the deck's dump command"
             raise ColumnsError(f"{path} is binary and does not name its {width} columns; {advice}")
@@ -86,7 +86,7 @@ class BinaryDump(Dump):
                 place, step, count, fault = handle.tell(), -1, 0, f"truncated in its header ({HINT})"
                 try:
                     head = self._header(handle, f"{self.path}, frame {number}")
-                    step, count, fault = head.step, head.count, f"truncated, not all of its {head.count} rows are there ({HINT})"
+                    step, count, fault = head.step, head.count, f"truncated, fewer than its {head.count} rows ({HINT})"
                     for _ in range(head.blocks):
                         (length,) = self._take(handle, _BLOCK)
                         if not self._source.reach(handle, handle.tell() + 8 * length):

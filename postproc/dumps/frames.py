@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 HINT = "skip_truncated=True leaves it out"
-NO_FLAGS = "the file does not say which axes are periodic (ITEM: BOX BOUNDS pp pp ff); none is taken to be"
+NO_FLAGS = "the file does not say which axes are periodic (ITEM: BOX BOUNDS pp pp ff); it is read as if none were"
 
 
 class DumpError(ValueError):
@@ -44,7 +44,7 @@ class CutOffError(DumpError):
 
 
 class DumpWarning(UserWarning):
-    """A dump that was read, but not as it stands; the message is one line."""
+    """A dump from which something was left out or put in order; the message is one line."""
 
 
 @dataclass(frozen=True)
@@ -96,9 +96,9 @@ def kept_entries(entries: Sequence[Entry]) -> tuple[list[Entry], str]:
         return list(entries), ""
     kept = {entry.step: entry for entry in sorted(entries, key=lambda entry: (entry.step, entry.file, entry.number))}
     dropped = len(entries) - len(kept)
-    said = f"steps go back in frame {back[0].number}; frames were put in the order of their steps"
+    said = f"steps go back in frame {back[0].number}; frames were sorted by step"
     if dropped:
-        said += f", {dropped} of them written again later in the file {'were' if dropped > 1 else 'was'} left out"
+        said += f", {dropped} that {'are' if dropped > 1 else 'is'} repeated later in the file {'were' if dropped > 1 else 'was'} left out"
     return list(kept.values()), said
 
 
@@ -155,7 +155,7 @@ class Dump(ABC):
             units, source = named[0].units, self._where(named[0])
         for entry in named:
             if entry.units != units:
-                raise DumpError(f"{self._where(entry)}: its units are {entry.units}, but {source} says {units}; all frames have the same")
+                raise DumpError(f"{self._where(entry)}: its units are {entry.units}, but {source} says {units}; all must be the same")
         return units
 
     def _check_times(self, found: Sequence[Entry], kept: Sequence[Entry]) -> None:
@@ -278,7 +278,7 @@ def integers(values: Array, where: str) -> NDArray[np.int64]:
     exact = values.astype(np.int64)
     if not np.array_equal(exact, values):
         wrong = values[exact != values][0]
-        raise DumpError(f"{where} holds {wrong:.9g}, which is no integer")
+        raise DumpError(f"{where} holds {wrong:.9g}, which is not an integer")
     if largest >= 1e6:
         # %g, the format of `dump local` by default, makes 1234567 to 1.23457e+06.
         large = exact[np.abs(exact) >= 1e6]

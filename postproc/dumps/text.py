@@ -25,7 +25,7 @@ _BOXES = {(): 2, (b"xy", b"xz", b"yz"): 3, (b"abc", b"origin"): 4}
 
 
 class _HeaderError(DumpError):
-    """A header that is none."""
+    """A header that cannot be read."""
 
 
 @dataclass
@@ -151,7 +151,7 @@ class TextDump(Dump):
                 window.pass_blank()
             if rows == count and window.peek(len(_ITEM)) not in (b"", _ITEM[: len(window.peek(len(_ITEM)))]):
                 raise DumpError(f"{self.path}, line {window.line_number}: frame {number} has more than its {count} lines")
-            fault = "" if rows == count else f"truncated, {rows} of {count} lines are there ({HINT})"
+            fault = "" if rows == count else f"truncated, it has {rows} of {count} lines ({HINT})"
         except CutOffError:
             window.begin = window.end
         except _HeaderError:
@@ -187,7 +187,7 @@ class TextDump(Dump):
             window.pass_over(begin, more)
             rows += more
             if fault == _HEADER or (not fault and rows < head.count and not window.more()):
-                raise CutOffError(f"{where}: truncated, {rows} of {head.count} lines are there ({HINT})")
+                raise CutOffError(f"{where}: truncated, it has {rows} of {head.count} lines ({HINT})")
             if fault:
                 raise DumpError(self._message(window, where, fault, column, head.columns))
         low, high, tilt = head.box

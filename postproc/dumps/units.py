@@ -33,7 +33,7 @@ class UnitStyle:
     density: float
 
     def factor(self, column: str) -> float | None:
-        """That of a column of a dump of grains or contacts; None for one whose dimension is not known."""
+        """Factor of a column of a dump of grains or contacts; None for one whose dimension is not known."""
         found = next((dimension for pattern, dimension in _DIMENSIONS if pattern.fullmatch(column)), None)
         values = {"1": 1.0, "length": self.length, "mass": self.mass, "density": self.density, "velocity": self.velocity,
                   "force": self.force, "spin": self.velocity / self.length, "torque": self.force * self.length,
@@ -61,7 +61,7 @@ def unit_style(name: str, where: str) -> UnitStyle:
     if key == "lj":
         raise DumpError(f"{where}: its units are lj, which have no size in SI; scale the numbers first")
     if key not in _STYLES:
-        raise DumpError(f"{where}: its units are {name}, which is no unit style; there are {', '.join(_STYLES)}")
+        raise DumpError(f"{where}: its units are {name}, which is not a unit style; there are {', '.join(_STYLES)}")
     return _STYLES[key]
 
 

@@ -47,7 +47,7 @@ class FieldSet:
 
     def __getattr__(self, name: str) -> Any:
         if name not in _FIELDS:
-            raise AttributeError(f"{name!r} is no field")
+            raise AttributeError(f"{name!r} is not a field")
         return self.values.get(name)
 
     def arrays(self) -> dict[str, Array]:

@@ -96,7 +96,7 @@ class Rings:
 
     @cached_property
     def upward(self) -> _Table:
-        """What `along` says, side by side, over the height of the source. Beyond the table nothing flows any more."""
+        """Values of `along`, side by side, over the height of the source. Beyond the table nothing flows any more."""
         places = self._places(self.vertical[0] - _BEYOND * self.width, self.vertical[-1] + _BEYOND * self.width)
         return _Table(places, np.hstack(self.along(places)))
 
@@ -109,7 +109,7 @@ class Rings:
 
     @cached_property
     def radial_table(self) -> tuple[Array, Array, Array, Array]:
-        """What `across` says of a source, for each B-spline of the table: (nr, k) three times and (nr, k + 1)."""
+        """Values of `across` at a source, for each B-spline of the table: (nr, k) three times and (nr, k + 1)."""
         return self._parted(self.radially.coefficients)
 
     @cached_property

@@ -164,9 +164,9 @@ class FieldAverages:
         """What was computed and checked, in lines."""
         lines = [*self.chosen.lines(self.diameters), *self.walls.mesh_notes()]
         if self.left_over:
-            lines.append(f"note: the last {self.left_over} frames fill no group of their own and were left out")
+            lines.append(f"note: the last {self.left_over} frames do not fill a group and were left out")
         size = " × ".join(f"{1e3 * one:.4g}" for one in self.grid.spacing)
-        how = f"{100.0 * self.seen:.3g} % of them saw at least {self.least_contacts} contacts, the others are masked"
+        how = f"{100.0 * self.seen:.3g} % of them have at least {self.least_contacts} contacts, the others are masked"
         if self.kernel is not None:
             how = f"{self.kernel.name} kernel of width {1e3 * self.kernel.width:.4g} mm ({self.kernel.width / self.chosen.diameter:.3g} d)"
         many = f"{len(self.groups)} times" if len(self.groups) > 1 else "1 time"
@@ -202,7 +202,7 @@ class FieldAverages:
         if box is not None:
             parts = box.split(",")
             if len(parts) != 6:
-                raise DembarkError(f"{box!r} is no region", "in --box", "give x0,x1,y0,y1,z0,z1")
+                raise DembarkError(f"{box!r} is not a region", "in --box", "give x0,x1,y0,y1,z0,z1")
             spans = np.array([span(",".join(parts[2 * axis : 2 * axis + 2]), diameter, "--box") for axis in range(3)])
             # Only a grid over all of the period goes on at its other side.
             first = source.grains[numbers[0]]
@@ -222,7 +222,7 @@ def _names(text: str | None, known: Collection[str]) -> list[str]:
     names = [name.strip() for name in text.split(",")] if text else []
     for name in names:
         if name not in known:
-            raise DembarkError(f"{name!r} is no field", "in --fields", f"there are {', '.join(known)}{near(name, known)}")
+            raise DembarkError(f"{name!r} is not a field", "in --fields", f"there are {', '.join(known)}{near(name, known)}")
     return names
 
 

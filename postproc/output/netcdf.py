@@ -80,7 +80,7 @@ def joined(datasets: Sequence[xarray.Dataset]) -> xarray.Dataset:
     odd = {str(name) for one in datasets for name in {*datasets[0].variables} ^ {*one.variables}}
     try:
         if odd:
-            raise ValueError(f"{', '.join(sorted(odd))} are not there at all times")
+            raise ValueError(f"{', '.join(sorted(odd))} are missing at some times")
         return xarray.concat(datasets, "time", data_vars="minimal", coords="minimal", compat="equals", join="exact",
                              combine_attrs="override")
     except ValueError as error:

@@ -108,14 +108,14 @@ def test_averages_by_cell_mask_thin_cells(run, capsys):
     assert main([*words, "--least-contacts", "32"]) == 0
     said = capsys.readouterr().out
     # Two contacts of each of four columns lie in a lower or middle cell, in each of four frames.
-    assert "66.7 % of them saw at least 32 contacts" in said and float(said.split("difference ")[1].split(";")[0]) < 1e-12
+    assert "66.7 % of them have at least 32 contacts" in said and float(said.split("difference ")[1].split(";")[0]) < 1e-12
     with xarray.open_dataset("f.nc") as found:
         assert found.method == "cell averages" and int(found.contact_count.sum()) == 4 * 64
         assert np.isnan(found.stress[0, :, :, 2]).all() and not np.isnan(found.stress[0, :, :, :2]).any()
         lower = 4 * 1.05 * WEIGHT * (4 * RADIUS + 3 * 2 * RADIUS) / 0.02**3
         np.testing.assert_allclose(found.stress[0, :, :, 0, 2, 2], lower)
     assert main([*words[:4], "f.nc"]) == 0
-    assert "0 % of them saw at least 3000 contacts" in capsys.readouterr().out
+    assert "0 % of them have at least 3000 contacts" in capsys.readouterr().out
 
 
 def test_walls_of_a_run(run, capsys):
@@ -227,7 +227,7 @@ MISTAKES = [
     (["fields", "run", "--out", "run"], "is a folder"),
     (["fields", "run", "--out", "f.nc", "--paraview", "f.nc"], "named twice"),
     (["fields", "run", "--out", "f.nc", "--kernel", "gausian"], "gaussian"),
-    (["fields", "run", "--out", "f.nc", "--width", "0d"], "'0d' is no length"),
+    (["fields", "run", "--out", "f.nc", "--width", "0d"], "'0d' is not a length"),
     (["fields", "run", "--out", "f.nc", "--width", "1.5 kg"], "--width: cannot convert '1.5 kg' to m; give e.g. '4 mm'"),
     (["fields", "run", "--out", "f.nc", "--width", "4,5 mm"], "--width: '4,5 mm' has a comma; write the decimal point: 4.5 mm"),
     (["fields", "run", "--out", "f.nc", "--width", "1e999d"], "--width = 1e999d: give a finite number"),
@@ -255,10 +255,10 @@ MISTAKES = [
     (["walls", "run", "--wall", "base:plain"], "did you mean plane?"),
     (["walls", "run", "--wall", "base:plane:orign=0,0,0"], "did you mean origin?"),
     (["walls", "run", "--wall", "base:plane:origin=0,0"], "three numbers"),
-    (["walls", "run", "--wall", "base:plane:normal=0,0,0"], "no direction"),
+    (["walls", "run", "--wall", "base:plane:normal=0,0,0"], "not a direction"),
     (["walls", "run", "--wall", "base:plane:normal"], "no value"),
     (["walls", "run", "--wall", "base:cylinder"], "radius is missing"),
-    (["walls", "run", "--wall", "base:cylinder:radius=-1"], "no length"),
+    (["walls", "run", "--wall", "base:cylinder:radius=-1"], "not a length"),
     (["walls", "run", "--wall", "base:cylinder:radius=1:around=none"], "around"),
     (["walls", "run", "--wall", "side:cylinder:radius=1"], "walls in it: base"),
     (["walls", "run", "--wall", "base:plane", "--wall", "base:plane"], "given twice"),

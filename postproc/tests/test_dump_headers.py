@@ -107,7 +107,7 @@ def test_units_that_contradict_each_other_are_refused(tmp_path, frames):
 
 
 @pytest.mark.parametrize(("units", "message"), [("lj", "its units are lj, which have no size in SI"),
-                                                ("furlongs", "furlongs, which is no unit style; there are si, cgs")])
+                                                ("furlongs", "furlongs, which is not a unit style; there are si, cgs")])
 def test_units_without_a_size_are_refused_by_name(tmp_path, units, message):
     (tmp_path / "a.dump").write_text(text(0, None, units) + text(1))
     for make in (lambda: GrainsDump(tmp_path / "a.dump")[1], lambda: next(iter(GrainsDump(tmp_path / "a.dump", stream=True)))):
@@ -247,7 +247,7 @@ TURNED = "ITEM: BOX BOUNDS abc origin pp pp pp\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n"
     (text(0).replace("pp pp pp", "pp pp"), "frame 1: header cannot be read"),
     (b"(\xb5/\xfd" + b"x" * 40, "is compressed by zstd; unpack it first"),
     (b"BZh9" + b"x" * 40, "is compressed by bzip2; unpack it first"),
-    (struct.pack("=q", -10) + b"DUMPCUSTOM" + b"x" * 99, "is a binary dump of a format that is not read; write a text dump"),
+    (struct.pack("=q", -10) + b"DUMPCUSTOM" + b"x" * 99, "is a binary dump in a format that cannot be read; write a text dump"),
     (text(0).replace("\n2 ", "\n\n2 "), "more than its 3 lines"),
 ])
 def test_a_header_that_cannot_be_served_gets_one_line(tmp_path, data, message):
@@ -265,8 +265,8 @@ def plain(columns, rows):
 
 
 @pytest.mark.parametrize(("columns", "rows", "message"), [
-    ("id x y z radius mass", ["1.5 0 0 0 1 1"], "column id holds 1.5, which is no integer"),
-    ("id type x y z radius mass", ["1 1.25 0 0 0 1 1"], "column type holds 1.25, which is no integer"),
+    ("id x y z radius mass", ["1.5 0 0 0 1 1"], "column id holds 1.5, which is not an integer"),
+    ("id type x y z radius mass", ["1 1.25 0 0 0 1 1"], "column type holds 1.25, which is not an integer"),
     ("id x y z radius mass", [f"1.2345{n}e+06 0 0 0 1 1" for n in range(3)], "rounded to six digits"),
     ("id x y z radius mass", ["1 0 0 0 -1 1"], "grain 1 has a radius of -1"),
     ("id x y z diameter mass", ["1 0 0 0 1 1", "2 0 0 0 1 -3"], "grain 2 has a mass of -3"),
@@ -281,7 +281,7 @@ def test_numbers_that_make_no_sense_are_refused(tmp_path, columns, rows, message
     ("id x y z radius mass", "1 0 0 0 1 5", 2.0, 5.0, "the given density is not used, for the dump has a column mass"),
     ("id x y z radius density", "1 0 0 0 1 5", 2.0, 20.943951, "the given density is not used, for the dump has a column density"),
     ("id type x y z radius", "1 1 0 0 0 1\n2 2 0 0 0 1", 2.0, 8.3775804, "all grains have the given density, though there are 2 types"),
-    ("id x y z radius mass mass", "1 0 0 0 1 5 7", None, 5.0, "columns mass are there more than once; the first of each counts"),
+    ("id x y z radius mass mass", "1 0 0 0 1 5 7", None, 5.0, "columns mass appear more than once; the first of each is used"),
     ("id x y z radius mass shapex shapey shapez", "1 0 0 0 1 5 1 1 2", None, 5.0, "grains are taken as spheres"),
 ])
 def test_masses_are_those_of_the_dump_or_one_line_says_what_they_are(tmp_path, columns, row, density, mass, message):
@@ -310,10 +310,10 @@ def test_columns_of_contacts_in_another_order_are_not_guessed(tmp_path):
     path = tmp_path / "contacts.dump"
     good = contacts_text(0, [[1.0, 2.0, 3.0]], [[1.5, 2.0, 3.0]], [[1, 2]], [[7.0, 0.0, 0.0]])
     path.write_text(good.replace("c_contacts[1] c_contacts[2]", "c_contacts[2] c_contacts[1]"))
-    with pytest.raises(DumpError, match="the numbers of its 12 columns are not in their order; say by columns="):
+    with pytest.raises(DumpError, match="its 12 columns are not numbered in their order; name those of first"):
         ContactsDump(path)[0]
     path.write_text(good.replace(" 1 2 0 ", " 1 2.5 0 "))
-    with pytest.raises(DumpError, match=r"ids holds 2\.5, which is no integer"):
+    with pytest.raises(DumpError, match=r"ids holds 2\.5, which is not an integer"):
         ContactsDump(path)[0]
 
 

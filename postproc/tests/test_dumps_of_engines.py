@@ -133,7 +133,7 @@ def test_whatever_lammps_dumps_the_places_are_the_same(cgs, pattern):
 
 
 def test_a_binary_dump_of_lammps_is_refused_by_name(cgs):
-    with pytest.raises(DumpError, match="is a binary dump of a format that is not read; write a text dump"):
+    with pytest.raises(DumpError, match="is a binary dump in a format that cannot be read; write a text dump"):
         GrainsDump(cgs / "binary.bin")
 
 
@@ -163,4 +163,4 @@ def test_fields_of_a_vtk_series_that_begins_with_an_empty_box(empty, capsys, mon
     with pytest.warns(DumpWarning, match="which axes are periodic"):
         assert [len(frame.ids) for frame in ContactsDump(str(empty / "pairs*.vtk"))][:2] == [0, 0]
     assert main(["fields", "legacy*.vtk", "--frames", ":2", "--width", "1d", "--out", "f.nc"]) == 2
-    assert "there are no grains in frames 0 to 1, those that are chosen" in capsys.readouterr().err
+    assert "there are no grains in frames 0 to 1, which are the chosen ones" in capsys.readouterr().err

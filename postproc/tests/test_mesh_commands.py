@@ -35,9 +35,9 @@ def test_a_mesh_of_another_size_than_the_box_is_doubted(run, capsys):  # noqa: F
     square(run / "base.stl", 40.0)
     wall = "base:mesh:file=run/base.stl:unit="
     assert main(["walls", "run", "--wall", wall + "in", "--out", "w.nc"]) == 0
-    assert "note: the mesh base is 1016 mm wide, the box of the grains 60 mm; is unit= its file's?" in capsys.readouterr().out
+    assert "note: the mesh base is 1016 mm wide, the box of the grains 60 mm; is unit= that of its file?" in capsys.readouterr().out
     assert main(["walls", "run", "--wall", wall + "mm", "--out", "w.nc"]) == 0
     assert "is unit=" not in capsys.readouterr().out
     square(run / "base.stl", 0.04)
     assert main(["walls", "run", "--wall", wall + "mm", "--out", "w.nc"]) == 2
-    assert "the mesh is 0.04 x 0.04 x 0 mm, and the smallest grain 10 mm wide" in capsys.readouterr().err
+    assert "the mesh is 0.04 x 0.04 x 0 mm, and the smallest grain is 10 mm wide" in capsys.readouterr().err

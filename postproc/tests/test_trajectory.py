@@ -93,7 +93,7 @@ def test_columns_that_are_not_there(tmp_path):
 
 @pytest.mark.parametrize(
     ("lines", "message"),
-    [("1 0 0 0 1 1\n1 1 1 1 1 1\n", "grain 1 is there twice"), ("1 0 0 0 1 1\n1e17 1 1 1 1 1\n", "column id holds numbers beyond 2")],
+    [("1 0 0 0 1 1\n1 1 1 1 1 1\n", "grain 1 appears twice"), ("1 0 0 0 1 1\n1e17 1 1 1 1 1\n", "column id holds numbers beyond 2")],
 )
 def test_ids_that_tell_no_grains_apart(tmp_path, lines, message):
     path = tmp_path / "grains.dump"

@@ -77,7 +77,7 @@ class WallLoads:
         room = _room(self._chosen.first)
         sizes = {one.wall.name: float(np.ptp(one.wall.triangles.reshape(-1, 3), axis=0).max())
                  for one in self.walls if isinstance(one.wall, MeshWall)}
-        return [f"note: the mesh {name} is {1e3 * size:.4g} mm wide, the box of the grains {1e3 * room:.4g} mm; is unit= its file's?"
+        return [f"note: the mesh {name} is {1e3 * size:.4g} mm wide, the box of the grains {1e3 * room:.4g} mm; is unit= that of its file?"
                 for name, size in sizes.items() if size > _LARGE * room]
 
 
@@ -114,7 +114,7 @@ def _check_meshes(walls: Iterable[PatchedWall], source: Source, frame: GrainFram
             factors = {name: unit / one.unit for name, unit in STL_UNITS.items()}
             fits = [name for name, factor in factors.items() if not _misfit(replace(wall, triangles=wall.triangles * factor), frame)]
             size = " x ".join(f"{1e3 * extent:.4g}" for extent in np.ptp(wall.triangles.reshape(-1, 3), axis=0))
-            right = f"with unit={' or unit='.join(fits)} it fits" if fits else "give the unit of the file, and where the simulation had it"
+            right = f"with unit={' or unit='.join(fits)} it fits" if fits else "give the file's unit and its place in the simulation"
             raise DembarkError(f"the mesh is {size} mm, and {doubt}", f"in --wall {wall.name}", right)
         if not frame.wall_forces[wall.name].any():
             unfelt.append(one)
@@ -130,9 +130,9 @@ def _misfit(wall: MeshWall, frame: GrainFrame) -> str:
     """Why the mesh cannot be the wall that grains feel, '' when it can."""
     extent, smallest = np.ptp(wall.triangles.reshape(-1, 3), axis=0).max(), 2.0 * frame.radii.min()
     if extent > _ROOMS * _room(frame):
-        return f"the box of the grains only {1e3 * _room(frame):.4g} mm wide"
+        return f"the box of the grains is only {1e3 * _room(frame):.4g} mm wide"
     if extent < smallest:
-        return f"the smallest grain {1e3 * smallest:.4g} mm wide"
+        return f"the smallest grain is {1e3 * smallest:.4g} mm wide"
     felt = np.linalg.norm(frame.wall_forces[wall.name], axis=1) > 0.0
     if not felt.any():
         return ""

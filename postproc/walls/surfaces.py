@@ -36,7 +36,7 @@ def _unit(vector: Vector, what: str) -> Array:
     values = np.asarray(vector, float)
     length = float(np.linalg.norm(values)) if values.shape == (3,) else 0.0
     if not 0.0 < length < np.inf:
-        raise DembarkError(f"{what} {np.ravel(values).tolist()} is no direction", "", "give three finite numbers, not all zero")
+        raise DembarkError(f"{what} {np.ravel(values).tolist()} is not a direction", "", "give three finite numbers, not all zero")
     return values / length
 
 

@@ -18,7 +18,7 @@ from dembark.validation import engines, results
 from dembark.validation.case import deck
 from dembark.validation.case.model import Case
 
-from .plan import Plan, Series, finished
+from .plan import Plan, Series, is_finished
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,8 @@ def warnings(plan: Plan, found: Iterable[Estimate], folder: Path, room: float) -
         limit = plan.resources[one.series.place].time
         attempts = 1 + plan.retries
         if limit is not None and one.wall_time is not None and one.wall_time > limit * attempts:
-            lines.append(f"{one.series.place} needs about {one.wall_time / 3600:.1f} h, more than the {limit / 3600:.1f} h of each of its "
-                         f"{attempts} attempts together")
+            lines.append(f"{one.series.place} needs about {one.wall_time / 3600:.1f} h, more than "
+                         f"its {attempts} attempts of {limit / 3600:.1f} h have together")
     return lines
 
 
@@ -136,7 +136,7 @@ def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], folder: Pat
 
     `cores` of this machine give the time that it will take; None when the runs are jobs of a cluster.
     """
-    left = {one.series.place: sum(not finished(folder / one.series.place / run.folder_name, run) for run in one.series.runs)
+    left = {one.series.place: sum(not is_finished(folder / one.series.place / run.folder_name, run) for run in one.series.runs)
             for one in found}
     console.print(runs_table(found, left))
     runs, to_do = sum(len(one.series.runs) for one in found), sum(left.values())
@@ -148,7 +148,7 @@ def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], folder: Pat
                   f"{size_text(room)} on the disk", style="bold", soft_wrap=True)
     unknown = [str(one.series.place) for one in found if one.core_seconds is None]
     if unknown:
-        console.print(f"not in the sum, because their case does not say how many particles they have: {', '.join(unknown)}", soft_wrap=True)
+        console.print(f"not in the sum, because the number of their particles is unknown: {', '.join(unknown)}", soft_wrap=True)
     if cores is not None and to_do:
         costs = [(one.wall_time, one.cores) for one in found if one.wall_time is not None for _ in range(left[one.series.place])]
         console.print(f"on {cores} cores about {duration(wall_clock(costs, cores))}")

@@ -70,7 +70,7 @@ def _changes(sweep: SweepSpec, base: str, row: Mapping[str, Value]) -> dict[str,
         parameter = sweep.case.parameters[key]
         value = expression.evaluated(merged(sweep.case, sweep.profile, base, changes), key)
         if isinstance(value, bool | complex):
-            raise DembarkError(f"{key} = {expression.text!r} is no number")
+            raise DembarkError(f"{key} = {expression.text!r} is not a number")
         # Grains are counted: what comes out is the next whole number.
         counted = parameter.is_whole and isinstance(value, float) and math.isfinite(value)
         changes[key] = checked(parameter, round(value) if counted else value)
@@ -115,7 +115,7 @@ def points(spec: CampaignSpec) -> list[Point]:
 
 
 def _distinct(spec: CampaignSpec, found: Sequence[Point]) -> None:
-    """DembarkError when two points that differ have one folder, or one case of letters apart, which some file systems do not tell."""
+    """DembarkError when two points that differ have one folder, or folders that differ in upper and lower case only."""
     named: dict[tuple[str, str], Point] = {}
     for point in found:
         other = named.setdefault((point.sweep.case.name, point.variant.lower()), point)
@@ -135,7 +135,7 @@ def _sweeps(spec: CampaignSpec, found: Sequence[Point]) -> list[dict[str, Any]]:
 
 
 def _formal_orders(point: Point) -> dict[str, float]:
-    """Formal order of the scheme at a point, by the parameters of the method that vary; DembarkError when it is no positive number."""
+    """Formal order of the scheme at a point, by the parameters of the method that vary; DembarkError when it is not a positive number."""
     found, where = {}, f"point {point.variant}"
     for axis in (axis for axis in point.sweep.axes if axis in REFINEMENT):
         expression = point.sweep.formal_order or point.sweep.case.formal_order(axis)

@@ -171,6 +171,6 @@ def left_out(profile: str, only_cases: Sequence[str] = (), only_engines: Sequenc
     return {} if only_engines else engines.absent(engine for run in planned for engine in run.engines)
 
 
-def finished(folder: Path, run: Run) -> bool:
+def is_finished(folder: Path, run: Run) -> bool:
     """Whether `folder` holds the finished result of exactly this run."""
     return results.record(folder, run.inputs) is not None

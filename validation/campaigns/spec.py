@@ -74,7 +74,7 @@ class CampaignSpec:
     measure: Resources
 
 
-def shipped() -> dict[str, Path]:
+def shipped_campaigns() -> dict[str, Path]:
     """The campaigns that lie in the case folders, by name."""
     return {path.stem: path for case in files() for path in sorted(case.parent.glob("campaigns/*.toml"))}
 
@@ -84,14 +84,14 @@ def locate(name: str) -> Path:
     path = Path(name)
     if path.is_file():
         return path.resolve()
-    known = shipped()
+    known = shipped_campaigns()
     if name in known:
         return known[name].resolve()
     if path.is_dir():
         raise DembarkError(f"{name} is a folder", "", "give the campaign's file; to go on with a campaign: dembark resume FOLDER")
     if path.suffix == ".toml" and str(path.parent) != ".":
         raise DembarkError(f"there is no file {name}", "", nearest(path.name, (one.name for one in path.parent.glob("*.toml"))))
-    raise DembarkError(f"there is no campaign {name!r}", "neither a file nor one that lies in a case folder", nearest(path.stem, known))
+    raise DembarkError(f"there is no campaign {name!r}", "neither as a file nor in a case folder", nearest(path.stem, known))
 
 
 def read(path: Path) -> CampaignSpec:
@@ -149,13 +149,13 @@ class _Reader(TableReader):
 
     def folder_name(self, table: str, text: str) -> None:
         if not _NAME.fullmatch(text):
-            raise self.fail(table, f"name = {text!r} is no name of a folder", "wanted are up to 64 letters, digits, '.', '_' and '-'")
+            raise self.fail(table, f"name = {text!r} is not a name of a folder", "give up to 64 letters, digits, '.', '_' and '-'")
 
     def least(self, table: str, data: Mapping[str, Any], **lows: int) -> None:
         """DembarkError when one of the numbers in `data` is below its least value."""
         for key, low in lows.items():
             if data.get(key, low) < low:
-                raise self.fail(table, f"{key} = {data[key]} is out of range", f"allowed is >= {low}")
+                raise self.fail(table, f"{key} = {data[key]} is out of range", f"it must be >= {low}")
 
     def names(self, table: str, data: Mapping[str, Any], key: str, known: Iterable[str], what: str) -> tuple[str, ...]:
         """The list `key` of different ones among `known`; empty when it is not given."""
@@ -176,7 +176,7 @@ class _Reader(TableReader):
 
     def sweep(self, table: str, number: int, entry: Any, head: Mapping[str, Any], base: Mapping[str, Resources]) -> SweepSpec:
         if not isinstance(entry, dict):
-            raise self.fail("sweeps", f"{entry!r} is no sweep", "write each as a table [[sweeps]]")
+            raise self.fail("sweeps", f"{entry!r} is not a sweep", "write each as a table [[sweeps]]")
         shared = {key: head[key] for key in _SHARED if key in head and not (key == "variants" and "variant" in entry)}
         entry = shared | entry
         self.table(entry, table, _SWEEP, ("case",))
@@ -233,7 +233,7 @@ class _Reader(TableReader):
         for key, given in grid.items():
             self.known(table, key, case)
             if not isinstance(given, list):
-                raise self.fail(table, f"{key} = {given!r} is no list", f"write {key} = [...], or move it to fixed")
+                raise self.fail(table, f"{key} = {given!r} is not a list", f"write {key} = [...], or move it to fixed")
             if not given:
                 raise self.fail(table, f"{key} = [] has no values", "give it one or more")
             values = [self.values(table, {key: one}, case) for one in given]
@@ -250,7 +250,7 @@ class _Reader(TableReader):
         for index, entry in enumerate(entries, start=1):
             place = f"{table}.list {index}"
             if not isinstance(entry, dict) or not entry:
-                raise self.fail(place, f"{entry!r} is no point", "wanted is a table {parameter = value, ...}")
+                raise self.fail(place, f"{entry!r} is not a point", "write a table {parameter = value, ...}")
             row = self.values(place, entry, case)
             if rows and row.keys() != rows[0].keys():
                 raise self.fail(place, f"a point with {', '.join(row)}", f"all must have the first one's {', '.join(rows[0])}")
@@ -266,19 +266,19 @@ class _Reader(TableReader):
             if key in given:
                 raise self.fail(table, f"{key} is derived and given", "remove it from one of the two")
             if not isinstance(text, str):
-                raise self.fail(table, f"{key} = {text!r} has the wrong type", "wanted is an expression in a text, or move it to fixed")
+                raise self.fail(table, f"{key} = {text!r} has the wrong type", "write an expression in a text, or move it to fixed")
         return {key: self.expression(table, text, case.parameters) for key, text in texts.items()}
 
     def known(self, table: str, key: str, case: Case) -> None:
         if key == "replicas":
-            raise self.fail(table, "replicas is no parameter of a sweep", "write replicas = ... in [[sweeps]] or [campaign]")
+            raise self.fail(table, "replicas is not a parameter of a sweep", "write replicas = ... in [[sweeps]] or [campaign]")
         pick(key, case.parameters, "parameter", f"{self.where(table)}, case {case.name}")
 
     def values(self, table: str, entry: Mapping[str, Any], case: Case) -> dict[str, Value]:
         for key, given in entry.items():
             self.known(table, key, case)
             if isinstance(given, bool) or not isinstance(given, int | float | str):
-                raise self.fail(table, f"{key} = {given!r} has the wrong type", "wanted is a number or a text")
+                raise self.fail(table, f"{key} = {given!r} has the wrong type", "give a number or a text")
         return {key: self.value(table, case.parameters[key], given) for key, given in entry.items()}
 
     def resources(self, table: str, data: Mapping[str, Any], base: Mapping[str, Resources]) -> dict[str, Resources]:
@@ -297,7 +297,7 @@ class _Reader(TableReader):
             if one.ranks > 1 and not facts.ranks:
                 raise self.fail(place, f"ranks = {one.ranks} for {engine}", f"use threads: {facts.one_process}")
             if one.time is not None and one.restart_interval is not None and one.restart_interval >= one.time:
-                raise self.fail(place, "restart_interval is not shorter than time", "a run that is ended must have written a restart file")
+                raise self.fail(place, "restart_interval is not shorter than time", "a run must write a restart file before its time ends")
         return found
 
     def changed(self, table: str, base: Resources, data: Mapping[str, Any]) -> Resources:

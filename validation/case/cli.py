@@ -69,7 +69,7 @@ def new_case(
 ) -> None:
     """Write a template of a case that runs."""
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
-        raise DembarkError(f"{name!r} is no name of a case", "", "take lower-case letters, digits and underscores, a letter first")
+        raise DembarkError(f"{name!r} is not a name of a case", "", "take lower-case letters, digits and underscores, a letter first")
     if (shipped_root() / name).exists():
         raise DembarkError(f"a case {name} comes with dembark", "", "choose another name")
     target = folder / name

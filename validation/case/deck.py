@@ -153,7 +153,7 @@ def sources(case: Case, engine: str) -> dict[str, str]:
     return found | {f"derived {name}": expression.text for name, expression in case.derived.items()} | {"outputs": " ".join(case.outputs)}
 
 
-def included(case: Case, engine: str) -> dict[str, str]:
+def included_sources(case: Case, engine: str) -> dict[str, str]:
     """The source of the deck of `engine` and of every file that it includes, directly or through others, by file name."""
     found: dict[str, str] = {}
     waiting = [engines.facts(engine).deck]
@@ -206,7 +206,7 @@ def archive(case: Case, folder: Path) -> None:
 
 
 def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -> dict[str, bytes]:
-    kind = engines.registered(engine)
+    kind = engines.engine_class(engine)
     source = case.folder / kind.facts.deck
     try:
         text = source.read_text(encoding="utf-8")

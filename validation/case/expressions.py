@@ -34,7 +34,7 @@ class Expression:
         try:
             body = ast.parse(text, mode="eval").body
         except SyntaxError:
-            raise DembarkError(f"{text!r} is no expression") from None
+            raise DembarkError(f"{text!r} is not an expression") from None
         self.text, reader = text, _Reader(text)
         self._code = reader.compiled(body)
         self._needed, self._parts = frozenset(reader.names), reader.parts

@@ -29,7 +29,7 @@ def shipped_root() -> Path:
     """Folder of the cases that ship, or the one that DEMBARK_DECKS names in its place."""
     named = os.environ.get(INSTEAD)
     if named and not Path(named).is_dir():
-        raise DembarkError(f"{INSTEAD}={named} is no folder", "", "set it to the folder that holds the case folders")
+        raise DembarkError(f"{INSTEAD}={named} is not a folder", "", "set it to the folder that holds the case folders")
     return Path(named).resolve() if named else package_root()
 
 
@@ -38,7 +38,7 @@ def own_roots() -> list[Path]:
     named = [Path(text) for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text]
     for root in named:
         if not root.is_dir():
-            raise DembarkError(f"{root} is no folder", f"in {VARIABLE} or --cases", "name the folder that holds your case folders")
+            raise DembarkError(f"{root} is not a folder", f"in {VARIABLE} or --cases", "name the folder that holds your case folders")
         if (root / "case.toml").is_file():
             raise DembarkError(f"{root} is a case itself", f"in {VARIABLE} or --cases",
                                f"name the folder above it, {root.resolve().parent}")

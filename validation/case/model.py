@@ -80,7 +80,7 @@ def checked(parameter: Parameter, value: Value) -> Value:
     limits = ((operator.gt, parameter.above), (operator.ge, parameter.min), (operator.lt, parameter.below), (operator.le, parameter.max))
     if not all(limit is None or within(number, limit) for within, limit in limits):
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-        raise DembarkError(f"{parameter.name} = {number:g}{unit} is out of range", f"allowed is {parameter.range}")
+        raise DembarkError(f"{parameter.name} = {number:g}{unit} is out of range", f"it must be {parameter.range}")
     return number
 
 
@@ -209,7 +209,7 @@ class Case:
                 for key, value in self.picture.items()} or None
 
     def lacks(self, engine: str, values: Mapping[str, Value]) -> list[str]:
-        """What `engine` has not of what a run with the parameters `values` needs, in words."""
+        """What a run with the parameters `values` needs and `engine` lacks, in words."""
         where = f"[needs] of case {self.name}"
         return engines.facts(engine).lacks(name for name, condition in self.needs.items() if condition.evaluated(values, where=where))
 

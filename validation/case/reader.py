@@ -120,7 +120,7 @@ class CaseReader(TableReader):
         result: dict[str, Any] = {name: entry for group in groups for name, entry in group.get(table, {}).items()}
         for name, entry in data.get(table, {}).items():
             if not isinstance(entry, dict):
-                raise self.fail(f"{table}.{name}", f"{entry!r} is no table", "write it as { key = value, ... }")
+                raise self.fail(f"{table}.{name}", f"{entry!r} is not a table", "write it as { key = value, ... }")
             result[name] = {**result.get(name, {}), **entry}
         return result
 
@@ -128,14 +128,14 @@ class CaseReader(TableReader):
         """[parameters.NAME], its own value checked."""
         table = f"parameters.{name}"
         if not name.isidentifier():
-            raise self.fail(table, f"{name!r} is no name of a parameter", "letters, digits and underscores")
+            raise self.fail(table, f"{name!r} is not a name of a parameter", "letters, digits and underscores")
         found = self.record(Parameter, entry, table, name=name)
         if found.value is None and not found.optional:
             raise self.fail(table, "value is missing", "a value, or optional = true")
         if isinstance(found.value, str) and not found.values:
-            raise self.fail(table, f"value = {found.value!r} is no number", "a number; words need values = [...]")
+            raise self.fail(table, f"value = {found.value!r} is not a number", "a number; words need values = [...]")
         if not si_unit(found.unit):
-            raise self.fail(table, f"{found.unit!r} is no base SI unit", 'such as m or kg/m^3, or "1"; --set accepts others')
+            raise self.fail(table, f"{found.unit!r} is not a base SI unit", 'such as m or kg/m^3, or "1"; --set accepts others')
         self.value(table, found, found.value)
         return found
 
@@ -151,7 +151,7 @@ class CaseReader(TableReader):
     def constraint(self, text: str, message: Any, parameters: Mapping[str, Parameter]) -> Constraint:
         """An entry of [constraints]: the condition, and the sentence for whoever breaks it."""
         if not isinstance(message, str):
-            raise self.fail("constraints", f"{message!r} is no sentence", 'write "condition" = "what is wrong when it does not hold"')
+            raise self.fail("constraints", f"{message!r} is not a sentence", 'write "condition" = "what is wrong when it does not hold"')
         return Constraint(self.expression("constraints", text, parameters), message)
 
     def changes(self, kind: str, tables: Mapping[str, Any], parameters: Mapping[str, Parameter]) -> dict[str, dict[str, Value]]:
@@ -161,7 +161,7 @@ class CaseReader(TableReader):
         for name, entry in tables.items():
             table = f"{kind}.{name}"
             if not isinstance(entry, dict):
-                raise self.fail(table, f"{entry!r} is no table", "overrides are a table of key = value")
+                raise self.fail(table, f"{entry!r} is not a table", "overrides are a table of key = value")
             base = found[self.pick(str(entry["like"]), found, kind[:-1], table)] if "like" in entry else {}
             own = {self.pick(key, parameters, "parameter", table): value for key, value in entry.items() if key != "like"}
             found[name] = base | {key: self.value(table, parameters[key], value) for key, value in own.items()}

@@ -95,15 +95,15 @@ class TableReader:
     def table(self, data: Mapping[str, Any], name: str, keys: Mapping[str, Types], required: Iterable[str] = ()) -> None:
         """DembarkError unless `data`, the table `name`, is one that has only `keys`, of these types, and all that are `required`."""
         if not isinstance(data, Mapping):
-            raise self.fail(name, f"{data!r} is no table", "write it as { key = value, ... }")
+            raise self.fail(name, f"{data!r} is not a table", "write it as { key = value, ... }")
         for key, value in data.items():
             if key not in keys:
                 raise self.fail(name, f"unknown key {key!r}", nearest(key, keys), key)
             if not isinstance(value, keys[key]) or (isinstance(value, bool) and keys[key] not in (bool, (bool,))):
-                raise self.fail(name, f"{key} = {value!r} has the wrong type", f"wanted is {wanted(keys[key])}", key)
+                raise self.fail(name, f"{key} = {value!r} has the wrong type", f"it must be {wanted(keys[key])}", key)
         for key in required:
             if key not in data:
-                raise self.fail(name, f"{key} is missing", f"wanted is {wanted(keys[key])}")
+                raise self.fail(name, f"{key} is missing", f"it must be {wanted(keys[key])}")
 
     def texts(self, data: Mapping[str, Any], table: str, keys: Iterable[str]) -> None:
         """DembarkError unless the lists `keys` of `data` hold texts only."""

@@ -26,7 +26,7 @@ def read(reader: TableReader, data: Mapping[str, Any]) -> dict[str, dict[str, An
     for name, entry in data.items():
         table = f"walls.{name}"
         if not isinstance(entry, dict):
-            raise reader.fail(table, f"{entry!r} is no table", 'write it as { kind = "plane", ... }')
+            raise reader.fail(table, f"{entry!r} is not a table", 'write it as { kind = "plane", ... }')
         kind = reader.pick(str(entry.get("kind")), _KINDS, "kind of wall", table)
         reader.table(entry, table, _KINDS[kind], ("radius",) if kind == "cylinder" else ())
         for key, value in entry.items():
@@ -47,7 +47,7 @@ def resolved(case: Case, values: Mapping[str, Any]) -> dict[str, dict[str, Any]]
         where = f"[walls] of case {case.name}, {name}"
         found = Expression(value).evaluated(values, key, where) if isinstance(value, str) else value
         if not isinstance(found, int | float):
-            raise DembarkError(f"{key} = {value!r} is no number", where, "a parameter in it has no value")
+            raise DembarkError(f"{key} = {value!r} is not a number", where, "a parameter in it has no value")
         return float(found)
 
     return {name: {key: value if key in ("kind", "motion") else

@@ -20,8 +20,22 @@ from .lammps import Lammps
 from .liggghts import Liggghts
 from .yade import Yade
 
-__all__ = ["CAPABILITIES", "ENGINES", "DeckNumber", "Engine", "EngineFacts", "absent", "call", "end_with_parent", "facts", "find",
-           "mpi_launcher", "names", "registered", "titles"]
+__all__ = [
+    "CAPABILITIES",
+    "ENGINES",
+    "DeckNumber",
+    "Engine",
+    "EngineFacts",
+    "absent",
+    "call",
+    "end_with_parent",
+    "engine_class",
+    "facts",
+    "find",
+    "mpi_launcher",
+    "names",
+    "titles",
+]
 
 ENGINES: tuple[type[Engine], ...] = (Liggghts, Yade, Lammps)
 
@@ -33,13 +47,13 @@ def names() -> tuple[str, ...]:
 
 def facts(name: str) -> EngineFacts:
     """What is known of the engine called `name` even where it is not installed; DembarkError with near matches for an unknown one."""
-    return registered(name).facts
+    return engine_class(name).facts
 
 
 @cache
 def find(name: str) -> Engine:
-    """The engine called `name`, asked for its version; DembarkError when it is unknown, or telling what to do if it is not installed."""
-    return registered(name).find()
+    """The engine called `name`, asked for its version; DembarkError when it is unknown or, with what to do, not installed."""
+    return engine_class(name).find()
 
 
 def absent(wanted: Iterable[str]) -> dict[str, str]:
@@ -60,7 +74,7 @@ def titles(joint: str, which: Callable[[EngineFacts], bool] = lambda _: True) ->
     return f" {joint} ".join([", ".join(found[:-1]), found[-1]]) if len(found) > 1 else "".join(found)
 
 
-def registered(name: str) -> type[Engine]:
+def engine_class(name: str) -> type[Engine]:
     """The class of the engine called `name`; DembarkError with near matches for an unknown one."""
     pick(name, names(), "engine", "")
     return next(engine for engine in ENGINES if engine.facts.name == name)

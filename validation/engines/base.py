@@ -25,9 +25,9 @@ LAUNCHER = "DEMBARK_MPIRUN"
 # What dembark's part of the engines reads in the environment: how many contacts it computes at a time.
 SWITCHES = ("DEMBARK_LANES",)
 # What a case may need of an engine apart from a deck, by the names that `[needs]` of case.toml and the facts of engines use.
-CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid that grains own", "rolling_resistance": "couples against rolling",
-                "own_inertia": "moments of inertia but those of spheres",
-                "creeping_friction": "friction of boxes that has no spring"}
+CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid carried by grains", "rolling_resistance": "couples against rolling",
+                "own_inertia": "moments of inertia other than a sphere's",
+                "creeping_friction": "friction of boxes without a spring"}
 DECK_NOTE = ("Written by dembark; SI units. The numbers without a comment follow from the others: to change a parameter, write the deck "
              "anew with 'dembark deck'.")
 
@@ -135,13 +135,13 @@ class Engine(ABC):
     @classmethod
     def locate(cls) -> Path:
         """The program, or the folder above its `bin`, that the environment names, else the program that was built here, else, if one from
-        elsewhere will do, that on PATH; DembarkError telling what to do if there is none."""
+        elsewhere will do, that on PATH; DembarkError, with what to do, if there is none."""
         facts, tree = cls.facts, checkout()
         for variable in filter(os.environ.get, facts.variables):
             named = Path(os.environ[variable])
             path = named / "bin" / facts.executable if named.is_dir() else named
             if not _is_program(path):
-                raise DembarkError(f"{variable}={path} is no program", "", f"set {variable} to the engine's executable, or unset it")
+                raise DembarkError(f"{variable}={path} is not a program", "", f"set {variable} to the engine's executable, or unset it")
             return path
         here = tree / "build" / facts.built if tree else None
         if here and _is_program(here):
@@ -153,7 +153,7 @@ class Engine(ABC):
 
     @classmethod
     def find(cls) -> Self:
-        """The engine of this machine, asked for its version; DembarkError telling what to do if there is none."""
+        """The engine of this machine, asked for its version; DembarkError, with what to do, if there is none."""
         bare = cls(cls.locate(), "", "")
         command = [str(bare.executable), *cls.facts.version_words]
         version = _first_match(cls.facts.version_pattern, command, bare.environment())
@@ -254,5 +254,5 @@ def _first_match(pattern: str, command: list[str], environment: Mapping[str, str
     found = re.search(pattern, done.stdout + done.stderr)
     if found:
         return found.group(1)
-    last = (done.stderr or done.stdout).strip().splitlines()[-1:] or [f"exit code {done.returncode} without a word"]
-    raise DembarkError(f"{command[0]} does not tell its version", "", last[0])
+    last = (done.stderr or done.stdout).strip().splitlines()[-1:] or [f"exit code {done.returncode} and no output"]
+    raise DembarkError(f"{command[0]} does not print its version", "", last[0])

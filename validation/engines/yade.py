@@ -33,7 +33,7 @@ class Yade(Engine):
         lines += [f"    {name}={number.value!r}," + (f"  # {number.meaning}" if number.meaning else "") for name, number in numbers.items()]
         before, marker, after = source.partition("p = dembark.parameters()\n")
         if not marker:
-            raise DembarkError("the deck has no line 'p = dembark.parameters()'", cls.facts.deck, "add it where the numbers are to stand")
+            raise DembarkError("the deck has no line 'p = dembark.parameters()'", cls.facts.deck, "add it where the numbers belong")
         return before + "\n".join([*lines, ")"]) + "\n" + after
 
     def command(self, deck: Path, values: Mapping[str, Value], ranks: int = 1, threads: int = 1) -> list[str]:

@@ -1,5 +1,5 @@
 """Whether engines are equivalent, pair by pair, by two one-sided tests; or, where nothing is random, whether the difference is within a
-bound that the quantity brings along.
+bound of the quantity.
 
 Two one-sided tests (TOST, D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987) 657) at 2.5 % each: the difference is shown to be above
 -10 % and below +10 %, which is so when its 95 % interval is within them. That engines do not differ significantly shows nothing: runs that
@@ -44,7 +44,7 @@ _SEEN = 0.01
 def compare(folder: Path) -> Comparison:
     """The engines that have a `metrics.json` below the folder of a case and variant, compared. RunError for fewer than two.
 
-    Of each pair of engines the first in alphabetical order is the reference. What chance may do is shared by all pairs of the page.
+    Of each pair of engines the first in alphabetical order is the reference. All pairs of the page share the allowance for chance.
     """
     measured = sorted((read(path) for path in folder.glob(f"*/{METRICS}")), key=lambda one: one.engine)
     if len(measured) < 2:
@@ -100,7 +100,7 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
             tolerance, verdict, reason = None, "info", f"{PACKINGS} packings in each engine are needed to compare them"
         elif unknown is not None or few < PACKINGS:
             verdict, decided = "info", f"{PACKINGS} packings in each engine or more"
-            reason = "an interval comes from within fewer packings than were planned" if unknown is None else (
+            reason = "an interval comes from fewer packings than planned" if unknown is None else (
                 f"an interval is unknown: {unknown.basis or 'the run is too short'}")
         else:
             chance_of = _chance(value, reference, 1.0 - (1.0 - CONFIDENCE) / comparisons)

@@ -30,7 +30,7 @@ def decides(deviation: float, own: float, reference: float, tolerance: float, ba
         return enough if count == 1.0 or not math.isfinite(own) else f"{enough}, or {longer}"
     if math.isfinite(count):
         return f"about {smallest(lambda number: rescaled(own, count, number) <= wanted, round(count))} packings"
-    return longer if "block" in basis else f"inputs known so well that they change the value by ±{wanted:.2g}, now ±{own:.2g}"
+    return longer if "block" in basis else f"inputs known well enough to change the value by at most ±{wanted:.2g}, now ±{own:.2g}"
 
 
 def packings(basis: str) -> float:

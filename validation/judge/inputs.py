@@ -35,7 +35,7 @@ def content(path: Path) -> str:
 
 
 def of_code(*places: str) -> str:
-    """That of the code in files or folders of this package, with all that they import, and the layouts that lie with it."""
+    """Hash of the code in files or folders of this package, of all that they import, and of the layouts in their folders."""
     roots = [path for place in places for path in _files(_HERE.parents[1] / place)]
     return digest(imports.dependencies(*(path for path in roots if path.suffix == ".py")).digest(),
                   [content(path) for path in roots if path.suffix != ".py"])
@@ -47,7 +47,7 @@ def _files(place: Path) -> Iterable[Path]:
 
 
 def of_measurement(case: Case, records: Iterable[Path]) -> str:
-    """That of the measurement of the finished runs with these `records`, their run.json."""
+    """Hash of the inputs of a measurement: the finished runs with these `records`, their run.json."""
     return digest(_FORMAT, _of_measuring(case), [content(path) for path in records])
 
 
@@ -57,24 +57,24 @@ def _of_measuring(case: Case) -> list[Any]:
 
 
 def of_pictures(case: Case, records: Iterable[Path]) -> str:
-    """That of the pictures, which are of the first run."""
+    """Hash of the inputs of the pictures, which show the first run."""
     drawing = imports.dependencies(Path(imports.module_file("dembark.postproc.pictures") or "")).digest() if case.picture else ""
     return digest(drawing, dict(case.picture), [content(path) for path in records][:1])
 
 
 def of_verdicts(case: Case) -> str:
-    """That of the judgement of measured quantities, apart from what was measured."""
+    """Hash of what the verdicts of a case depend on apart from the measurement."""
     judging = imports.dependencies(_HERE / "verdict.py", _HERE.parent / "metrics.py").digest()
     return digest(judging, [asdict(one) for one in case.quantities.values()], [asdict(one) for one in case.findings],
                   case.references, case.paired)
 
 
 def of_study(case: Case, points: Iterable[Path]) -> str:
-    """That of a study from the results of its variants."""
+    """Hash of the inputs of a study: the results of its variants."""
     return digest(_of_measuring(case), [content(path) for path in points], of_verdicts(case))
 
 
-def stored(path: Path) -> str:
+def stored_hash(path: Path) -> str:
     """The hash that stands in the result `path`, a JSON file or a report; "" when there is no such result, or it holds none."""
     if path.suffix == ".json":
         return str((read_json(path) or {}).get(KEY, ""))

@@ -24,7 +24,7 @@ Kind = TypeVar("Kind", bound="QuantityRecord | Result | Comparison")
 class QuantityRecord:
     """A quantity as it stands in `metrics.json`: numbers in `unit` (None where there is none), 95 % intervals as (low, high).
 
-    `verdict` is pass, fail or info, with its `reason`; `tolerance` None means that nothing was due to be checked. `deviation` is value
+    `verdict` is pass, fail or info, with its `reason`; `tolerance` None means that there is no check. `deviation` is value
     minus reference, over the reference when `deviation_kind` is "relative". `evidence`: what the reference is, one of EVIDENCE; "" is not
     stated. `compared`: the engines are to agree in it, within `agreement` (in `unit`) where nothing is random. `control`: wrong physics
     that fails the check; a pass of a check that nothing is known to fail is not counted. `independent`: the reference is not from other
@@ -81,7 +81,7 @@ class QuantityRecord:
     @property
     def standing(self) -> str:
         """passed, uncontrolled (passed, but no wrong physics is known to fail it), failed, open (a check that could not be decided) or
-        information (nothing was due)."""
+        information (no check)."""
         if self.verdict == "pass":
             return "passed" if self.control else "uncontrolled"
         if self.verdict == "fail":

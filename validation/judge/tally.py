@@ -1,4 +1,4 @@
-"""How many checks passed, failed and stayed open, by kind of evidence: what every place says that speaks of verdicts.
+"""How many checks passed, failed and stayed open, by kind of evidence: the numbers that screen and reports show.
 
 One fact is one check: quantities of a family, such as a measured angle in three engines, count once. The family fails when one of them
 fails, and is open when one of them is open.
@@ -27,7 +27,7 @@ MEANING = {"experiment": "measured values", "theory": "laws and exact solutions"
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of quantities: checks that passed, failed or could not be decided (open), and those that nothing was due of; apart from
+    """Numbers of quantities: checks that passed, failed or could not be decided (open), and those without a check; apart from
     them checks that passed but are not counted, for no wrong physics is known to fail them (uncontrolled)."""
 
     passed: int = 0

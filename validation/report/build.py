@@ -18,7 +18,7 @@ from dembark.validation.judge.result import Result
 
 from . import facts, front, numbers, scatter, sections
 from .figures import colour, engine_name, subscripts
-from .gather import Gathered, gather
+from .gather import ReportData, gather
 
 _HERE = Path(__file__).parent
 _SIGNS = {"passed": "✓ pass", "failed": "✗ FAIL", "open": "○ open", "information": "", "uncontrolled": "not counted"}
@@ -38,7 +38,7 @@ def build(folder: Path) -> Path:
                                           "verification": sections.verification(gathered, drawn)})
 
 
-def write(gathered: Gathered, chapters: Any) -> Path:
+def write(gathered: ReportData, chapters: Any) -> Path:
     """Lay out a report: first pages and provenance of `gathered`, and between them what `chapters(folder of figures)` adds to the
     context."""
     folder = gathered.folder
@@ -71,7 +71,7 @@ _FILES: Mapping[str, str] = {"style": "style.css", "script": "report.js"}
 _EMPTY: Mapping[str, Any] = {"sections": (), "sweeps": (), "errors": (), "verification": ()}
 
 
-def _environment(gathered: Gathered) -> Environment:
+def _environment(gathered: ReportData) -> Environment:
     found = Environment(loader=FileSystemLoader(_HERE), autoescape=select_autoescape(["html", "j2"]), undefined=StrictUndefined,
                         trim_blocks=True, lstrip_blocks=True)
     found.filters |= {"plain": numbers.plain, "compact": numbers.compact, "subscripts": subscripts,
@@ -79,7 +79,7 @@ def _environment(gathered: Gathered) -> Environment:
                       # A line may end in front of the half-width, not within it.
                       "unbroken": lambda text: text.replace("± ", "±\N{NO-BREAK SPACE}")}
     found.globals |= {"signs": _SIGNS, "estimate": numbers.with_interval, "unit": numbers.with_unit, "deviation": numbers.deviation,
-                      "allowed": numbers.allowed, "colour": colour, "engines_of": facts.engines}
+                      "allowed": numbers.tolerance_text, "colour": colour, "engines_of": facts.engines}
     return found
 
 

@@ -17,7 +17,7 @@ from dembark.validation.judge.tally import MEANING, Tally, families, tally
 
 from . import scatter
 from .facts import Fact, facts
-from .gather import Gathered, Row
+from .gather import ReportData, Row
 
 # Lines of each list that the PDF holds; what is left out is counted, and in the HTML.
 MOST = {"failed": 8, "open": 18, "missing": 6, "checks": 16}
@@ -120,7 +120,7 @@ def failed_groups(found: Iterable[Fact]) -> list[tuple[str, list[Fact]]]:
     return [(why or UNKNOWN, group) for (_, why), group in groups.items()]
 
 
-def context(gathered: Gathered) -> Mapping[str, Any]:
+def context(gathered: ReportData) -> Mapping[str, Any]:
     """What the template shows on the first pages."""
     rows = gathered.rows
     found, counted = scatter.points(rows), tally(row.record for row in rows)

@@ -85,7 +85,7 @@ class Page:
 
 
 @dataclass(frozen=True)
-class Gathered:
+class ReportData:
     """A results folder: its `pages`, the verification of the instruments, `missing` runs and unreadable results in one line each, and
     the content of `plan.json`."""
 
@@ -120,7 +120,7 @@ class Gathered:
         return [*(f"{page.name}: {line}" for page in self.pages for line in page.missing), *self.unread]
 
 
-def gather(folder: Path) -> Gathered:
+def gather(folder: Path) -> ReportData:
     """Everything that `plan.json` expects in a results folder, and everything that is there; without it, nothing is known to be missing."""
     summary = plan(folder) or {"description": _SINGLE}
     cases, unread = _cases(summary.get("cases", ()))
@@ -151,7 +151,7 @@ def gather(folder: Path) -> Gathered:
         return one.case, one.is_study, names.index(one.variant) if one.variant in names else len(names), one.variant
 
     ordered = sorted(pages.values(), key=order)
-    return Gathered(folder, ordered, verification.read(folder), cases, unread, summary)
+    return ReportData(folder, ordered, verification.read(folder), cases, unread, summary)
 
 
 def _cases(only: Collection[str]) -> tuple[dict[str, Case], list[str]]:

@@ -58,7 +58,7 @@ def deviation(one: QuantityRecord) -> str:
     return with_unit(plain(difference, 2), one.unit)
 
 
-def allowed(one: QuantityRecord) -> str:
+def tolerance_text(one: QuantityRecord) -> str:
     """The tolerance, in per cent where it is relative; empty where there is none."""
     if one.tolerance is None:
         return ""

@@ -13,7 +13,7 @@ from typing import Any
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from dembark.common.parallel import mapped
+from dembark.common.parallel import parallel_map
 from dembark.postproc import field_figures, pictures
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
@@ -22,7 +22,7 @@ from dembark.validation.judge.tally import Tally, tally
 from . import figures, front
 from .facts import Fact, facts, quantities
 from .figures import engine_name
-from .gather import Gathered, Page, variations
+from .gather import Page, ReportData, variations
 
 # Of a case in the PDF: variants with figures, and panels of a figure. Of the first variant all main figures are printed, of others none,
 # and of each study PANELS panels.
@@ -44,7 +44,7 @@ class Shown:
 
 @dataclass
 class Part:
-    """A variant within a case's section, for the HTML: figures, and values that nothing was due of."""
+    """A variant within a case's section, for the HTML: figures, and values without a check."""
 
     page: Page
     values: list[Fact]
@@ -89,18 +89,18 @@ def printed(checks: Iterable[Fact]) -> list[Fact]:
     return quantities(one for one in checks if one.standing == "failed" or one.worst.record.evidence not in ("identity", "code"))
 
 
-def sections(gathered: Gathered, folder: Path) -> list[Section]:
+def sections(gathered: ReportData, folder: Path) -> list[Section]:
     """All cases of the results, their data written into `folder`."""
-    drawn = mapped(partial(_figures, folder=folder), gathered.pages)
+    drawn = parallel_map(partial(_figures, folder=folder), gathered.pages)
     of_case: dict[str, list[tuple[Page, list[Shown]]]] = {}
     for page, (shown, wrong) in zip(gathered.pages, drawn, strict=True):
         page.missing += wrong
         of_case.setdefault(page.case, []).append((page, shown))
-    studies = mapped(_studies, [[page for page, _ in of_page if page.is_study] for of_page in of_case.values()])
+    studies = parallel_map(_studies, [[page for page, _ in of_page if page.is_study] for of_page in of_case.values()])
     return [_section(gathered, case, of_page, printed) for (case, of_page), printed in zip(of_case.items(), studies, strict=True)]
 
 
-def _section(gathered: Gathered, name: str, of_page: list[tuple[Page, list[Shown]]], studies: list[Shown]) -> Section:
+def _section(gathered: ReportData, name: str, of_page: list[tuple[Page, list[Shown]]], studies: list[Shown]) -> Section:
     pages = [page for page, _ in of_page]
     rows = [row for page in pages for row in page.rows()]
     known = gathered.cases.get(name)
@@ -203,7 +203,7 @@ def _fields(page: Page, folder: Path) -> tuple[list[Shown], list[str]]:
     return found, []
 
 
-def verification(gathered: Gathered, folder: Path) -> list[dict[str, Any]]:
+def verification(gathered: ReportData, folder: Path) -> list[dict[str, Any]]:
     """The items of the verification for the template; the data of their figures are written next to the report."""
     found = []
     for item in gathered.items:

@@ -16,7 +16,7 @@ from dembark.common.units import duration, size_text
 from dembark.validation import results, show
 from dembark.validation.campaigns import estimate, expand
 from dembark.validation.campaigns.plan import Plan
-from dembark.validation.campaigns.spec import locate, read, shipped
+from dembark.validation.campaigns.spec import locate, read, shipped_campaigns
 
 from . import cluster, folder, site, workflow
 from .folder import Options
@@ -37,7 +37,7 @@ app = typer.Typer()
 def show_campaigns() -> None:
     """List the campaigns that come with the cases."""
     table = Table("campaign", "cases", "points", "what", box=None, pad_edge=False)
-    for name, path in shipped().items():
+    for name, path in shipped_campaigns().items():
         spec = read(path)
         cases = ", ".join(dict.fromkeys(sweep.case.name for sweep in spec.sweeps))
         table.add_row(name, cases, str(len(expand.points(spec))), " ".join(spec.description.split()))
@@ -96,10 +96,10 @@ def _check(chosen: Options, plan: Plan, where: site.Site | None) -> None:
         raise DembarkError("--jobs is for a cluster", "with --executor local", "use --cores for the runs of this machine")
     for place, used in plan.resources.items():
         if used.cores > _cores(chosen):
-            raise DembarkError(f"{place} is to run on {used.cores} cores", f"there are {_cores(chosen)}",
+            raise DembarkError(f"{place} needs {used.cores} cores", f"there are {_cores(chosen)}",
                                "lower ranks or threads, or raise --cores")
         if used.memory and used.memory > _memory():
-            raise DembarkError(f"{place} is to have {size_text(used.memory)} of memory", f"this machine has {size_text(_memory())}",
+            raise DembarkError(f"{place} needs {size_text(used.memory)} of memory", f"this machine has {size_text(_memory())}",
                                "lower memory")
 
 

@@ -20,7 +20,7 @@ from typing import Any
 
 from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.parallel import prepare_worker
-from dembark.validation.campaigns.plan import RETRIES, Resources, Run, finished
+from dembark.validation.campaigns.plan import RETRIES, Resources, Run, is_finished
 from dembark.validation.results import State
 
 from .simulate import simulate
@@ -50,7 +50,7 @@ class States:
     several threads."""
 
     def __init__(self, tasks: Iterable[Task], steps: Iterable[Step] = ()) -> None:
-        self._states = {task.name: State(task.name, "finished" if finished(task.out / task.run.folder_name, task.run) else "waiting",
+        self._states = {task.name: State(task.name, "finished" if is_finished(task.out / task.run.folder_name, task.run) else "waiting",
                                          inputs=task.run.inputs, estimate=task.estimate) for task in tasks}
         self._states |= {step.name: State(step.name, kind=step.kind) for step in steps}
         self._guard = threading.RLock()

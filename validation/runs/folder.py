@@ -13,7 +13,7 @@ from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import write_atomic, write_json
-from dembark.common.lock import held
+from dembark.common.lock import is_held
 from dembark.validation import engines, provenance, results
 from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.campaigns.plan import Plan
@@ -65,10 +65,10 @@ def read_name(folder: Path) -> str:
 
 
 def own_file(folder: Path) -> Path:
-    """The campaign's file in its folder; DembarkError when it is no campaign's folder."""
+    """The campaign's file in its folder; DembarkError when it is not a campaign's folder."""
     copy = folder / CAMPAIGN_FILE
     if not copy.is_file():
-        raise DembarkError(f"{folder} is no campaign's folder", f"it has no {CAMPAIGN_FILE}",
+        raise DembarkError(f"{folder} is not a campaign's folder", f"it has no {CAMPAIGN_FILE}",
                            "start one with 'dembark submit FILE --out FOLDER'")
     return copy.resolve()
 
@@ -142,7 +142,7 @@ class Status:
     @property
     def headline(self) -> str:
         """One line."""
-        return f"{self.name}: {headline(self.states)}" + ("" if self.running or self.complete else "; nobody runs it now")
+        return f"{self.name}: {headline(self.states)}" + ("" if self.running or self.complete else "; no process runs it now")
 
     @property
     def complete(self) -> bool:
@@ -151,12 +151,12 @@ class Status:
 
 
 def look(folder: Path) -> Status:
-    """The state of the campaign in `folder`, from its files alone; DembarkError when it is no campaign's."""
+    """The state of the campaign in `folder`, from its files alone; DembarkError when it is not a campaign's."""
     own_file(folder)
     states = tuple(results.states(folder))
     if not states:
         raise DembarkError(f"the campaign in {folder} has not been started", "", f"start it with 'dembark resume {folder}'")
-    running = held(folder / LOCK) or any(state.state == "running" for state in states)
+    running = is_held(folder / LOCK) or any(state.state == "running" for state in states)
     report = folder / "report.html"
     measured = {Path(state.folder).parent for state in states if (folder / state.folder).with_name(METRICS).is_file()}
     return Status(read_name(folder), running, states, time_left(states), len(measured), of_folder(folder),

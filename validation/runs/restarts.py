@@ -35,9 +35,9 @@ class Attempts:
     ended: bool = True
 
 
-def supported(run: Run) -> bool:
+def writes_restarts(run: Run) -> bool:
     """Whether the deck, with all that it includes, writes states to resume from."""
-    texts = deck.included(run.case, run.engine.name).values()
+    texts = deck.included_sources(run.case, run.engine.name).values()
     return any(word in text for text in texts for word in run.engine.facts.restart_words)
 
 
@@ -78,7 +78,7 @@ def work_folders(target: Path) -> Iterator[Path]:
 
 def begin(run: Run, work: Path) -> int | None:
     """Make `work` ready for an attempt: the step to resume from, or None and an empty folder when there is no complete state."""
-    step = newest(work, run.engine.name) if work.is_dir() and supported(run) else None
+    step = newest(work, run.engine.name) if work.is_dir() and writes_restarts(run) else None
     if step is None:
         before = attempts(work)
         shutil.rmtree(work, ignore_errors=True)

@@ -28,7 +28,7 @@ from dembark.common.errors import DembarkError, Interrupted, Killed, RunError
 from dembark.common.files import DISK_FULL, disk_error, move_into_place, sweep, write_json
 from dembark.common.lock import lock
 from dembark.validation import provenance
-from dembark.validation.campaigns.plan import Resources, Run, finished
+from dembark.validation.campaigns.plan import Resources, Run, is_finished
 from dembark.validation.case import deck, walls
 from dembark.validation.engines import end_with_parent
 from dembark.validation.results import State, lock_file, status_file
@@ -137,7 +137,7 @@ def simulate(run: Run, out: Path, cancel: threading.Event, used: Resources | Non
     with lock(lock_file(target), f"{target} is being computed by another process", cancel) as lost:
         sweep(target)
         status = Status(run, target, follow)
-        if finished(target, run):
+        if is_finished(target, run):
             status.remove()
             return False
         status(state="running", began=time.time())
@@ -177,28 +177,28 @@ def _run_into(run: Run, target: Path, progress: Progress, cancel: threading.Even
         move_into_place(work, target)
         _forget_failure(target)
     except OSError as error:
-        kept, going_on = _going_on(run, work)
+        kept, going_on = _resumption(run, work)
         raise RunError(f"{run.name} failed", str(disk_error(error, target)), going_on) from None
     except Interrupted:
         if lost.is_set():
             kept = True
             raise Killed(f"{run.name} was given up", "another process has taken its lock, because this one was held up") from None
-        kept, going_on = _going_on(run, work)
+        kept, going_on = _resumption(run, work)
         raise Interrupted(f"{run.name} was interrupted", going_on) from None
     except RunError as error:
         # A run is at fault for what it did, but not when it was killed, or for a disk without room.
         faulty = computed and not isinstance(error, Killed) and not str(error).startswith(DISK_FULL)
-        kept, going_on = (False, "") if faulty else _going_on(run, work)
+        kept, going_on = (False, "") if faulty else _resumption(run, work)
         raise type(error)(f"{run.name} failed", str(error), going_on, _keep_log(work, target)) from None
     finally:
         if not kept:
             shutil.rmtree(work, ignore_errors=True)
 
 
-def _going_on(run: Run, work: Path) -> tuple[bool, str]:
+def _resumption(run: Run, work: Path) -> tuple[bool, str]:
     """Whether there is a state to resume from, and what the next attempt will do, in words."""
     step = restarts.newest(work, run.engine.name)
-    how = "begins anew" if step is None else f"goes on from step {step}"
+    how = "starts again from its beginning" if step is None else f"continues from step {step}"
     return step is not None, f"it {how} when it is started again"
 
 
@@ -225,7 +225,7 @@ def _execute(run: Run, work: Path, step: int | None, progress: Progress, ended: 
     """One attempt in `work`, from `step` on (None: from the start); the record of the finished run."""
     words: dict[str, Value] = {}
     every = 0
-    if restarts.supported(run):
+    if restarts.writes_restarts(run):
         interval = restarts.INTERVAL if used.restart_interval is None else used.restart_interval
         every = restarts.steps_between(run, interval, used.cores)
         words = {"restart_every": every} | ({"resume": "yes"} if step is not None else {})

@@ -108,7 +108,7 @@ def read(path: Path) -> Site:
                 raise reader.fail("top level", f"{{{word}}} in {key} is not known", nearest(word, _WORDS[key]))
     for key in ("at_a_time", "largest_array"):
         if data.get(key, 1) < 1:
-            raise reader.fail("top level", f"{key} = {data[key]} is out of range", "allowed is >= 1")
+            raise reader.fail("top level", f"{key} = {data[key]} is out of range", "it must be >= 1")
     try:
         numbers = {key: convert(data[key]) for key, convert in (("memory", units.size), ("time", units.seconds)) if key in data}
     except DembarkError as error:

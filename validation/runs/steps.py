@@ -48,7 +48,7 @@ class Step:
 
     def up_to_date(self) -> bool:
         """Whether the target is there and was made from the present inputs."""
-        return self.target.is_file() and inputs.stored(self.target) == self.inputs()
+        return self.target.is_file() and inputs.stored_hash(self.target) == self.inputs()
 
 
 def steps(folder: Path) -> list[Step]:

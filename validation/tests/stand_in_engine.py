@@ -2,7 +2,7 @@
 """Stands in for both engines where a test is about the handling of processes and files, not about physics.
 
 Called like LIGGGHTS (`-in deck -log none -var key value ...`) or YADE (`-j1 -n -x deck key=value ...`); it reads its numbers in the deck
-and obeys the deck contract unless the parameter `behaviour` asks for a fault. It writes its process id to `pid` in the working folder
+and obeys the deck contract unless the parameter `behaviour` names a fault. It writes its process id to `pid` in the working folder
 first.
 """
 

@@ -64,11 +64,11 @@ def test_a_number_in_the_place_of_a_value_is_refused(tmp_path: Path) -> None:
 def test_numerical_warnings_become_remarks_and_stay_errors_where_they_are(capsys: pytest.CaptureFixture[str]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("always")
-        with analysis.warnings_kept() as remarks:
+        with analysis.collected_warnings() as remarks:
             np.float64(0.0) / np.float64(0.0)
         assert len(remarks) == 1 and "invalid value" in remarks[0] and "test_analysis.py, line" in remarks[0]
         warnings.simplefilter("error")
-        with pytest.raises(RuntimeWarning), analysis.warnings_kept():
+        with pytest.raises(RuntimeWarning), analysis.collected_warnings():
             np.float64(0.0) / np.float64(0.0)
     assert capsys.readouterr().err == ""
 

@@ -35,17 +35,17 @@ SETTINGS = {
     "wall_friction=20 deg": "mixes up angles and plain ratios; give e.g. 0.3",
     "grain_diameter=small": "give e.g. '4 mm'",
     "grain_count=10.5": "is not a whole number, >= 1",
-    "grain_count=0": "allowed is >= 1",
-    "restitution=1.2": "allowed is >= 0.05 and <= 1",
-    "youngs_modulus=5 GPa": "allowed is >= 5e+06 and <= 1e+09",
-    "youngs_modulus=1 kPa": "allowed is >= 5e+06 and <= 1e+09",
-    "kinetic_friction=0.9": "wall_friction = 0.3 in case silo, wanted is kinetic_friction <= min(",
-    "cylinder_radius=1 cm": "wanted is cylinder_radius >= 3 * grain_diameter",
+    "grain_count=0": "it must be >= 1",
+    "restitution=1.2": "it must be >= 0.05 and <= 1",
+    "youngs_modulus=5 GPa": "it must be >= 5e+06 and <= 1e+09",
+    "youngs_modulus=1 kPa": "it must be >= 5e+06 and <= 1e+09",
+    "kinetic_friction=0.9": "wall_friction = 0.3 in case silo, it must hold that kinetic_friction <= min(",
+    "cylinder_radius=1 cm": "it must hold that cylinder_radius >= 3 * grain_diameter",
     "capillary_model=exakt": "allowed are exact | willett",
     "grain_diametre=4 mm": "did you mean grain_diameter",
     "grain_diameter": "write --set key=value",
     "grain_diameter=": "write --set key=value",
-    "frames=1": "allowed is >= 2",
+    "frames=1": "it must be >= 2",
 }
 
 COMMANDS = {
@@ -81,7 +81,7 @@ CAMPAIGNS = {
     "nan": ("grid = { restitution = [0.5, nan] }\n", "restitution = nan: give a finite number"),
     "infinite": ("grid = { cylinder_radius = [inf] }\n", "cylinder_radius = inf: give a finite number"),
     "bare unit": ('grid = { grain_diameter = ["mm"] }\n', "give a number with it, e.g. '4 mm'"),
-    "kinetic above static": ("grid = { kinetic_friction = [0.2, 0.9] }\n", "wanted is kinetic_friction <= min("),
+    "kinetic above static": ("grid = { kinetic_friction = [0.2, 0.9] }\n", "it must hold that kinetic_friction <= min("),
 }
 
 

@@ -110,9 +110,9 @@ def test_order_of_overrides(decks: Path) -> None:
     ("grain_diameter=1e400", ["grain_diameter = 1e400: give a finite number"]),
     ("grain_diameter=4,5 mm", ["grain_diameter: '4,5 mm' has a comma; write the decimal point: 4.5 mm"]),
     ("grain_diameter=1,234.5", ["has a comma"]),
-    ("grain_diameter=1'000", ["grain_diameter: \"1'000\" is no number"]),
-    ("grain_diameter=4.5.6", ["'4.5.6' is no number"]),
-    ("grain_diameter=4 5 mm", ["'4 5 mm' is no number"]),
+    ("grain_diameter=1'000", ["grain_diameter: \"1'000\" is not a number"]),
+    ("grain_diameter=4.5.6", ["'4.5.6' is not a number"]),
+    ("grain_diameter=4 5 mm", ["'4 5 mm' is not a number"]),
     ("grain_diameter=mm", ["grain_diameter = mm: give a number with it, e.g. '4 mm'"]),
     ("grain_diameter=4 kg", ["cannot convert '4 kg' to m; give e.g. '4 mm'"]),
     ("grain_count=1,000", ["grain_count: '1,000' has a comma"]),
@@ -169,12 +169,12 @@ variants = ["dry", "wet", "large"]
 
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('unit = "m"', 'unit = "metrez"', ["metrez", "parameters.grain_diameter"]),
-    ('unit = "m"', 'unit = "d"', ["'d' is no base SI unit", "parameters.grain_diameter"]),
+    ('unit = "m"', 'unit = "d"', ["'d' is not a base SI unit", "parameters.grain_diameter"]),
     ("value = 0.005", "value = -0.005", ["out of range", "parameters.grain_diameter"]),
     ("value = 0.005\n", "", ["value is missing"]),
     ('doc = "diameter"', "", ["doc is missing"]),
     ("above = 0.0", "abov = 0.0", ["abov", "did you mean above"]),
-    ("value = 0.005", 'value = "small"', ["'small' is no number", "parameters.grain_diameter"]),
+    ("value = 0.005", 'value = "small"', ["'small' is not a number", "parameters.grain_diameter"]),
     ("contact_angle = 0.1", "contact_angel = 0.1", ["contact_angel", "did you mean contact_angle"]),
     ("contact_angle = 0.1", "contact_angle = 3", ["out of range", "variants.wet"]),
     ('quick = [{variant = "dry"}', 'quick = [{variant = "dri"}', ["dri", "did you mean dry"]),
@@ -186,8 +186,8 @@ variants = ["dry", "wet", "large"]
     ('quick = [{variant = "dry"}', 'quick = [{variants = ["dri"]}', ["dri", "did you mean dry"]),
     ('quick = [{variant = "dry"}', 'quick = [{variants = []}', ["in quick", "give variant or variants"]),
     ('quick = [{variant = "dry"}', 'quick = [{variant = "dry", variants = ["wet"]}', ["in quick", "give variant or variants"]),
-    ('"the kinetic friction exceeds the static one"', "3", ["3 is no sentence", "[constraints]"]),
-    ("[runs]", '[studies]\nsize = "dry"\n[runs]', ["'dry' is no table", "studies.size"]),
+    ('"the kinetic friction exceeds the static one"', "3", ["3 is not a sentence", "[constraints]"]),
+    ("[runs]", '[studies]\nsize = "dry"\n[runs]', ["'dry' is not a table", "studies.size"]),
     ('engines = ["liggghts", "yade"]', 'engines = ["ligghts"]', ["did you mean liggghts"]),
     ("kinetic_friction <= static", "kinetic_frictio <= static", ["kinetic_frictio"]),
     ("kinetic_friction <= static_friction", "__import__('os')", ["unknown call of __import__()"]),
@@ -210,7 +210,7 @@ variants = ["dry", "wet", "large"]
     ("[runs]", '[picture]\ncolour_by = "velocity"\nscael = 1.0\n[runs]', ["did you mean scale", "[picture]"]),
     ("[runs]", '[picture]\ncolour_by = "velocity"\n[runs]', ["scale is missing", "[picture]"]),
     ("[runs]", '[picture]\ncolour_by = "speed"\nscale = 1\n[runs]', ["unknown colour_by 'speed'"]),
-    ("[runs]", '[picture]\ncross_section = "xz"\nspeed = "sqrt(9.81"\n[runs]', ["is no expression", "[picture]"]),
+    ("[runs]", '[picture]\ncross_section = "xz"\nspeed = "sqrt(9.81"\n[runs]', ["is not an expression", "[picture]"]),
     ('source = ["nobody"]', 'source = ["nobody"]\nreferences = ["janssen_1985"]', ["unknown reference 'janssen_1985'", "[case]"]),
     ('source = ["nobody"]', "source = [1]", ["source = [1]", "a list of texts"]),
 ])
@@ -285,7 +285,7 @@ def test_a_kinetic_friction_above_the_static_one_is_refused_with_defaults_and_va
         assert resolve(one, "quick", name, {"kinetic_friction": least})["kinetic_friction"] == least
         with pytest.raises(DembarkError, match="kinetic friction exceeds the static one"):
             resolve(one, "quick", name, {"kinetic_friction": 1.01 * least})
-    with pytest.raises(DembarkError, match="youngs_modulus = 5e\\+09 Pa is out of range, allowed is >= 5e\\+06 and <= 1e\\+09"):
+    with pytest.raises(DembarkError, match="youngs_modulus = 5e\\+09 Pa is out of range, it must be >= 5e\\+06 and <= 1e\\+09"):
         resolve(one, "quick", None, settings(["youngs_modulus=5 GPa"]))
 
 

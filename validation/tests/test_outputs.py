@@ -1,4 +1,4 @@
-"""What a case asks its decks to write: read from the case file, and every file of a run whole or refused."""
+"""What the decks of a case write: read from the case file, and every file of a run complete or refused."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def test_a_variant_runs_in_the_engines_that_can_do_it(third: Callable[[bool], Pa
 def test_an_engine_is_not_asked_for_what_it_cannot_do(third: Callable[[bool], Path], tmp_path: Path,
                                                    capsys: pytest.CaptureFixture[str]) -> None:
     case = third(True)
-    told = "The Third has no liquid that grains own, which these parameters of case box need, take liggghts or yade"
+    told = "The Third has no liquid carried by grains, which these parameters of case box need, take liggghts or yade"
     for action in (lambda: series(folders.find("box"), "wet", None, engines.find("third")),
                    lambda: deck.write(folders.find("box"), "third", {"contact_angle": 0.1}, tmp_path)):
         with pytest.raises(DembarkError) as caught:
@@ -70,9 +70,9 @@ def test_an_engine_is_not_asked_for_what_it_cannot_do(third: Callable[[bool], Pa
         assert str(caught.value) == told
     assert main(["deck", "box", "--engine", "third", "--set", "contact_angle=0.1", "--out", str(tmp_path / "deck")]) == 2
     assert told in capsys.readouterr().err
-    # A case that asks for it is wrong, and so is one that needs what nobody knows.
+    # A case that runs in it is wrong, and so is one with an unknown need.
     text = case.read_text()
-    for old, new, line in (('{variant = "wet"}', '{variant = "wet", engines = ["third"]}', "wet in third, which has no liquid that grains"),
+    for old, new, line in (('{variant = "wet"}', '{variant = "wet", engines = ["third"]}', "wet in third, which has no liquid carried"),
                            ("carried_liquid =", "caried_liquid =", "did you mean carried_liquid")):
         case.write_text(text.replace(old, new))
         folders.load.cache_clear()
@@ -124,7 +124,7 @@ def test_every_pair_is_compared_and_all_of_them_share_what_chance_may_do(tmp_pat
     assert found.engines == ("liggghts", "third", "yade")
     pairs = {(one.reference_engine, one.engine): one.verdict for one in found.quantities}
     assert pairs == {pair: "fail" if "third" in pair else "pass" for pair in combinations(found.engines, 2)}
-    # Four quantities of three pairs: the page as a whole fails by chance once in a hundred times.
+    # Four quantities of three pairs: the page fails by chance once in a hundred times.
     assert sum(one.chance or 0.0 for one in found.quantities) == pytest.approx(0.01)
 
 

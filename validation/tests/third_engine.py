@@ -10,7 +10,7 @@ from dembark.validation.engines import DeckNumber, Engine, EngineFacts
 
 
 class Third(Engine):
-    """An optional engine without liquid that grains own."""
+    """An optional engine without liquid carried by grains."""
 
     facts = EngineFacts("third", "The Third", "the third engine", deck="third.txt", version_words=("--version",),
                         version_pattern=r"third (\S+)", colour="#009E73", marker="D", variables=("THIRD",), target="make third",

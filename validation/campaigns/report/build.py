@@ -11,7 +11,7 @@ from dembark.validation.judge.result import Comparison
 from dembark.validation.judge.tally import tally
 from dembark.validation.report.build import write
 from dembark.validation.report.figures import engine_name
-from dembark.validation.report.gather import Gathered, gather
+from dembark.validation.report.gather import ReportData, gather
 from dembark.validation.report.sections import embed
 
 from . import figures, tables
@@ -33,13 +33,13 @@ def build(folder: Path) -> Path:
     return write(gathered, lambda drawn: _chapters(gathered, drawn))
 
 
-def _chapters(gathered: Gathered, drawn: Path) -> dict[str, Any]:
+def _chapters(gathered: ReportData, drawn: Path) -> dict[str, Any]:
     found = sweeps(gathered.summary.get("sweeps", ()), gathered.pages, gathered.cases)
     return {"title": f"Campaign {gathered.summary.get('campaign') or gathered.folder.name}",
             "sweeps": [_sweep(one, gathered, drawn) for one in found], "errors": numerical_errors(found)}
 
 
-def _sweep(sweep: Sweep, gathered: Gathered, drawn: Path) -> dict[str, Any]:
+def _sweep(sweep: Sweep, gathered: ReportData, drawn: Path) -> dict[str, Any]:
     quantities = sweep.quantities()
     chosen, name = quantities[:_PANELS], sweep.name
     tables.write_table_csv(drawn / f"{name}.csv", sweep)

@@ -141,14 +141,14 @@ kinetic_friction = "static_friction"
 
 
 @pytest.mark.parametrize(("derived", "expected"), [
-    ('{ contact_angle = 3 }', "wanted is an expression in a text"),
-    ('{ contact_angle = "import os" }', "is no expression"),
+    ('{ contact_angle = 3 }', "write an expression in a text"),
+    ('{ contact_angle = "import os" }', "is not an expression"),
     ('{ contact_angle = "grain_cuont" }', "did you mean grain_count or grain_diameter"),
     ('{ grain_count = "5" }', "grain_count is derived and given"),
     ('{ contact_angle = "1 / (20 - grain_count)" }', "point dry_grain_count=20"),
     ('{ contact_angle = "grain_count" }', "point dry_grain_count=10"),
-    ('{ contact_angle = "grain_count > 3" }', "is no number"),
-    ('{ replicas = "2" }', "replicas is no parameter of a sweep"),
+    ('{ contact_angle = "grain_count > 3" }', "is not a number"),
+    ('{ replicas = "2" }', "replicas is not a parameter of a sweep"),
 ])
 def test_mistakes_in_derived_parameters(derived: str, expected: str, tmp_path: Path) -> None:
     with pytest.raises(DembarkError) as error:

@@ -23,7 +23,7 @@ def written(folder: Path, text: str) -> site.Site:
 @pytest.mark.parametrize(("before", "after", "words"), [
     ("#SBATCH --nodes=1", "#SBATCH --partition=<partition>", "<partition> in header is a placeholder"),
     ("at_a_time = 100", "at_a_time = 0", "at_a_time = 0 is out of range"),
-    ('time = "30 min"', 'time = "30"', "'30' is no duration"),
+    ('time = "30 min"', 'time = "30"', "'30' is not a duration"),
     ('memory = "2 GB"', "memory = 2", "memory = 2 has the wrong type"),
     ("at_a_time = 100", "at_once = 5", "unknown key 'at_once'"),
     ("{script}", "{skript}", "{skript} in submit is not known"),

@@ -58,7 +58,7 @@ def dembark(folder: Path, *words: str) -> subprocess.Popen[str]:
 
 
 def at_work(results: Path, engine: str) -> tuple[Path, int] | None:
-    """Work folder and process of a run in `engine` that has written a whole state."""
+    """Work folder and process of a run in `engine` that has written a complete state."""
     for work in results.glob(f"*/*/{engine}/.replica-*.work-*"):
         if restarts.newest(work, engine) is None:
             continue

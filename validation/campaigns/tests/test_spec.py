@@ -97,11 +97,11 @@ MISTAKES = {
     "unknown table": (GRID + "[resuorces]\n", "unknown key 'resuorces', [top level] of"),
     "no campaign": ('[[sweeps]]\ncase = "box"\n', "campaign is missing"),
     "unknown key": (HEAD + 'replica = 2\n[[sweeps]]\ncase = "box"\n', "unknown key 'replica', [campaign] of"),
-    "name with a slash": ('[campaign]\nname = "a/b"\n[[sweeps]]\ncase = "box"\n', "'a/b' is no name of a folder"),
-    "wrong type of engines": (HEAD + 'engines = "yade"\n[[sweeps]]\ncase = "box"\n', "wanted is a list"),
+    "name with a slash": ('[campaign]\nname = "a/b"\n[[sweeps]]\ncase = "box"\n', "'a/b' is not a name of a folder"),
+    "wrong type of engines": (HEAD + 'engines = "yade"\n[[sweeps]]\ncase = "box"\n', "it must be a list"),
     "no sweeps": ("sweeps = []\n" + HEAD, "there are no sweeps"),
     "sweeps missing": (HEAD, "sweeps is missing"),
-    "sweeps no tables": (HEAD.replace("[campaign]", "sweeps = [3]\n[campaign]"), "3 is no sweep"),
+    "sweeps no tables": (HEAD.replace("[campaign]", "sweeps = [3]\n[campaign]"), "3 is not a sweep"),
     "case missing": (HEAD + "[[sweeps]]\ngrid = { grain_count = [1] }\n", "case is missing, [sweeps 1]"),
     "unknown case": (HEAD + '[[sweeps]]\ncase = "bxo"\n', "did you mean box?"),
     "unknown variant": (SWEEP + 'variant = "wett"\n', "did you mean wet?"),
@@ -113,7 +113,7 @@ MISTAKES = {
     "unknown parameter": (SWEEP + "grid = { grain_cuont = [10] }\n", "did you mean grain_count or"),
     "wrong unit": (SWEEP + 'grid = { grain_diameter = ["4 kg"] }\n', "[sweeps 1.grid] of"),
     "angle without its dimension": (SWEEP + 'grid = { contact_angle = ["30 mm"] }\n', "contact_angle"),
-    "out of range": (SWEEP + "grid = { grain_diameter = [0.004, -0.004] }\n", "grain_diameter = -0.004 m is out of range, allowed is > 0"),
+    "out of range": (SWEEP + "grid = { grain_diameter = [0.004, -0.004] }\n", "grain_diameter = -0.004 m is out of range, it must be > 0"),
     "not whole": (SWEEP + "grid = { grain_count = [10.5] }\n", "is not a whole number"),
     "no such choice": (SWEEP + 'grid = { behaviour = ["wild"] }\n', "allowed are ok | exit"),
     "a truth value": (SWEEP + "grid = { grain_count = [true] }\n", "grain_count = True has the wrong type"),
@@ -123,21 +123,21 @@ MISTAKES = {
     "decimal comma in memory": (GRID + '[resources]\nmemory = "1,5 GB"\n', "'1,5 GB' has a comma; write the decimal point: 1.5 GB"),
     "empty grid": (SWEEP + "grid = {}\n", "the grid is empty"),
     "axis without values": (SWEEP + "grid = { grain_count = [] }\n", "grain_count = [] has no values"),
-    "axis that is no list": (SWEEP + "grid = { grain_count = 10 }\n", "write grain_count = [...]"),
+    "axis that is not a list": (SWEEP + "grid = { grain_count = 10 }\n", "write grain_count = [...]"),
     "value twice": (SWEEP + 'grid = { grain_diameter = [0.004, "4 mm"] }\n', "has the value '4 mm' twice"),
     "grid and list": (GRID + "list = [{ grain_count = 5 }]\n", "grid and list are both given"),
     "empty list": (SWEEP + "list = []\n", "list = [] has no points"),
-    "point that is none": (SWEEP + "list = [3]\n", "3 is no point"),
+    "point that is none": (SWEEP + "list = [3]\n", "3 is not a point"),
     "point twice": (SWEEP + "list = [{ grain_count = 5 }, { grain_count = 5 }]\n", "is that of sweeps 1.list 1 again"),
     "points with different keys": (SWEEP + "list = [{ grain_count = 5 }, { grain_diameter = 0.004 }]\n",
                                    "all must have the first one's grain_count"),
     "nothing varies": (SWEEP, "nothing varies"),
     "fixed and varied": (GRID + "fixed = { grain_count = 5 }\n", "grain_count is fixed and varies"),
-    "replicas as an axis": (SWEEP + "grid = { replicas = [1, 2] }\n", "replicas is no parameter of a sweep"),
+    "replicas as an axis": (SWEEP + "grid = { replicas = [1, 2] }\n", "replicas is not a parameter of a sweep"),
     "negative ranks": (GRID + "[resources.liggghts]\nranks = -2\n", "ranks = -2 is out of range, [resources.liggghts] of"),
     "ranks for YADE": (GRID + "[resources.yade]\nranks = 2\n", "use threads: YADE runs in one process"),
-    "memory without unit": (GRID + '[resources]\nmemory = "500"\n', "'500' is no amount of memory"),
-    "unreadable time": (GRID + '[resources]\ntime = "two hours"\n', "'two hours' is no duration, wanted is a positive one"),
+    "memory without unit": (GRID + '[resources]\nmemory = "500"\n', "'500' is not an amount of memory"),
+    "unreadable time": (GRID + '[resources]\ntime = "two hours"\n', "'two hours' is not a duration, give a positive one"),
     "restart later than the end": (GRID + '[resources]\ntime = "1 h"\nrestart_interval = "2 h"\n',
                                    "restart_interval is not shorter than time"),
     "unknown resource": (GRID + '[resources]\nmemry = "1 GB"\n', "did you mean memory?"),
@@ -167,8 +167,8 @@ def test_a_mistake_gets_one_line_before_anything_starts(name: str, write, tmp_pa
     (["."], "is a folder"),
     (["small", "--executor", "slrum"], "--executor slrum is neither local, nor slurm, nor the file of a site"),
     (["small", "--jobs", "3"], "--jobs is for a cluster"),
-    (["wide", "--cores", "2"], "is to run on 3 cores, there are 2"),
-    (["large", "--cores", "2"], "is to have 1e+03 GB of memory"),
+    (["wide", "--cores", "2"], "needs 3 cores, there are 2"),
+    (["large", "--cores", "2"], "needs 1e+03 GB of memory"),
     (["smal"], "did you mean small?"),
 ])
 def test_a_wrong_command_gets_one_line(words: list[str], expected: str, decks: Path, tmp_path: Path,
@@ -185,10 +185,10 @@ def test_a_wrong_command_gets_one_line(words: list[str], expected: str, decks: P
 
 def test_shipped_campaigns_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DEMBARK_DECKS")
-    from dembark.validation.campaigns.spec import shipped
+    from dembark.validation.campaigns.spec import shipped_campaigns
 
-    assert len(shipped()) >= 10
-    for name, path in shipped().items():
+    assert len(shipped_campaigns()) >= 10
+    for name, path in shipped_campaigns().items():
         spec = read(path)
         assert spec.name == name and spec.description and points(spec)
         assert locate(name) == path.resolve()

@@ -1,4 +1,4 @@
-"""The state of runs, told by files alone: plan.json, run.json, status files and locks."""
+"""The state of runs, from files alone: plan.json, run.json, status files and locks."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_without_a_lock_nothing_runs_and_reasons_are_kept(results: Path) -> None
     status(results, 22, state="stopped", message="killed")
     found = look(results)
     assert not found.running and [state.state for state in found.states] == ["finished", "stopped", "failed", "stopped"]
-    assert found.left is None and found.headline == "boxes: 1 of 4 done, 0 running, 2 waiting, 1 failed; nobody runs it now"
+    assert found.left is None and found.headline == "boxes: 1 of 4 done, 0 running, 2 waiting, 1 failed; no process runs it now"
     assert [state.message for state in found.states] == ["", "its process was ended", "it blew up", "killed"]
     with lock(results / LOCK, "held"):
         assert look(results).running

@@ -91,7 +91,7 @@ def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Pat
     assert error.count("kill liggghts 1: stopped after") == 1
     assert "box dry_behaviour=ok liggghts 1: finished in" in (results / "campaign.log").read_text()
     state = look(results)
-    assert state.headline == "boxes: 4 of 5 done, 0 running, 0 waiting, 1 failed; nobody runs it now" and state.measured == 3
+    assert state.headline == "boxes: 4 of 5 done, 0 running, 0 waiting, 1 failed; no process runs it now" and state.measured == 3
     found = tables.quantities(results)
     assert list(found["value"]) == [1, 1, 2] and list(found["parameters.behaviour"]) == ["kill", "ok", "ok"]
     assert [sweep["title"] for sweep in read_json(results / "plan.json")["sweeps"]] == ["Behaviours", ""]
@@ -148,9 +148,9 @@ def test_a_folder_with_other_things_is_refused(tmp_path: Path, monkeypatch: pyte
     (tmp_path / "c.toml").write_text(CAMPAIGN)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/thesis.tex").touch()
-    for words, expected in ((("submit", "c.toml", "--out", "mine"), "not empty"), (("resume", "mine"), "no campaign's folder"),
-                            (("status", "mine"), "no campaign's folder"), (("submit", "c.toml", "--out", "c.toml"), "is a file"),
-                            (("export", "gone"), "gone is no folder"), (("report", "mine"), "no results in")):
+    for words, expected in ((("submit", "c.toml", "--out", "mine"), "not empty"), (("resume", "mine"), "not a campaign's folder"),
+                            (("status", "mine"), "not a campaign's folder"), (("submit", "c.toml", "--out", "c.toml"), "is a file"),
+                            (("export", "gone"), "gone is not a folder"), (("report", "mine"), "no results in")):
         assert main(list(words)) == 2
         error = capsys.readouterr().err
         assert expected in error and error.count("\n") == 1
@@ -175,7 +175,7 @@ def test_a_campaign_goes_on_after_its_submitter_was_killed(
     wait_for(lambda: not lives(pid))
     time.sleep(0.5)
     state = look(results)
-    assert not state.running and "nobody runs it now" in state.headline
+    assert not state.running and "no process runs it now" in state.headline
     record = results / "box/dry_behaviour=ok/liggghts/replica-1/run.json"
     made = record.stat().st_mtime_ns
 

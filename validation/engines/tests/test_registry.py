@@ -18,7 +18,7 @@ from dembark.common.errors import DembarkError
 from dembark.validation import doctor, engines
 from dembark.validation.case import folders
 from dembark.validation.cli import main
-from dembark.validation.engines import DeckNumber, Engine, EngineFacts, registered
+from dembark.validation.engines import DeckNumber, Engine, EngineFacts, engine_class
 from dembark.validation.engines.base import digest
 
 NAMED = re.compile("liggghts|yade|lammps", re.IGNORECASE)
@@ -135,7 +135,7 @@ def test_the_engine_itself_counts_and_not_its_launcher_alone(tmp_path: Path) -> 
             subprocess.run(["gcc", "-shared", "-fPIC", f"-DANSWER={answer}", "-o", library, tmp_path / "library.c"], check=True)
             if not linked.exists():
                 subprocess.run(["gcc", "-o", linked, tmp_path / "main.c", library, f"-Wl,-rpath,{tmp_path}"], check=True)
-        return {name: digest(registered(name)(path, "1", "").own_files()) for name, path in kinds.items()}
+        return {name: digest(engine_class(name)(path, "1", "").own_files()) for name, path in kinds.items()}
 
     before, after = build(1), build(2)
     assert all(before[name] != after[name] for name in kinds)

@@ -1,4 +1,4 @@
-"""A result comes back as it was written; one that is not whole, or of another version, is told in one line."""
+"""A result comes back as it was written; one that is incomplete, or of another version, gives one line."""
 
 import json
 from pathlib import Path

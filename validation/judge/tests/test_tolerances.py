@@ -56,7 +56,7 @@ def test_bounds_of_single_contacts_are_the_same_for_a_noisy_run(variant: str) ->
 
 
 def test_a_tolerance_from_the_run_s_own_interval_is_refused() -> None:
-    """The negative control: a measurement that allows what its noise asks for, under each of the names that it could take."""
+    """The negative control: a measurement that allows what its noise needs, under each of the names that it could take."""
     case = find("log_pair")
     noise = Estimate(1.3, 0.4, "5 replicas")
     with pytest.raises(DembarkError, match="quantity peak_force has a bound and an interval"):

@@ -40,7 +40,7 @@ def quantity(number: int, seed: int) -> QuantityRecord:
 
 
 def profile(number: int, seed: int) -> dict[str, object]:
-    """A curve with a band, every second beside a reference."""
+    """A curve with a band, every second with a reference."""
     place = np.linspace(0.0, 10.0, 60)
     value = 1.0 - np.exp(-place / (2.0 + number)) + 0.01 * np.sin(place + seed)
     return {"name": f"curve_{number}", "title": f"Curve {number}", "along": "depth / d", "across": "σ_zz (kPa)",

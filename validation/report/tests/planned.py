@@ -1,4 +1,4 @@
-"""Fills a results folder as a whole profile would: a result of every planned run and study, with all quantities that the case declares."""
+"""Fills a results folder as a complete profile would: a result of every planned run and study, with all declared quantities."""
 
 from __future__ import annotations
 

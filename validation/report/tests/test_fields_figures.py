@@ -1,4 +1,4 @@
-"""Fields that a measurement left are drawn with their data beside them; what cannot be drawn is told."""
+"""Fields that a measurement left are drawn with their data next to them; what cannot be drawn is reported."""
 
 import csv
 

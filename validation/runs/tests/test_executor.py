@@ -17,7 +17,7 @@ from harness import decks, stand_in  # noqa: F401
 from dembark.common.errors import Interrupted, Killed, RunError
 from dembark.common.files import write_json
 from dembark.validation.campaigns.plan import Resources, Run, of_profile
-from dembark.validation.judge.inputs import KEY, content, digest, stored
+from dembark.validation.judge.inputs import KEY, content, digest, stored_hash
 from dembark.validation.results import State
 from dembark.validation.runs import executor as executor_module
 from dembark.validation.runs.executor import Executor, States, Task
@@ -91,7 +91,7 @@ def test_what_was_killed_is_started_again_and_what_failed_is_not(tmp_path: Path,
     assert set(script["started"][:2]) == {one, two}
     assert {name: (state.state, state.message) for name, state in found.items()} == {
         one: ("finished", ""), two: ("failed", "it blew up"), three: ("failed", "x"), "m": ("finished", "")}
-    assert list(made.errors) == [two, three] and stored(tmp_path / "m.json")
+    assert list(made.errors) == [two, three] and stored_hash(tmp_path / "m.json")
 
 
 def test_steps_are_made_again_when_what_they_read_has_changed(tmp_path: Path) -> None:

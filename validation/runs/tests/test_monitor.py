@@ -1,4 +1,4 @@
-"""What is read from an engine's output, and what is told about it."""
+"""What is read from an engine's output, and the lines about it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run that is stopped, killed or interrupted goes on from its last whole state; one that failed, or has other inputs, begins anew."""
+"""A run that is stopped, killed or interrupted continues from its last complete state; one that failed starts from its beginning."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def work(below: Path) -> Path:
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade"])
 def test_killed_run_goes_on_from_its_newest_state(tmp_path: Path, engine: str) -> None:
-    with pytest.raises(Killed, match=r"killed by SIGKILL at step 50 of 100.*it goes on from step 40 when it is started again"):
+    with pytest.raises(Killed, match=r"killed by SIGKILL at step 50 of 100.*it continues from step 40 when it is started again"):
         run(tmp_path, engine, behaviour="kill")
     record = run(tmp_path, engine, behaviour="kill")
     assert (record["attempts"], record["resumed_at"], record["resume"], record["restart_every"]) == (2, [40], "exact", 20)
@@ -99,7 +99,7 @@ def test_failure_of_the_run_itself_begins_anew(tmp_path: Path) -> None:
 
 
 def test_full_disk_costs_no_state(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match=r"disk is full.*goes on from step 40"):
+    with pytest.raises(RunError, match=r"disk is full.*continues from step 40"):
         run(tmp_path, behaviour="full")
     assert run(tmp_path, behaviour="full")["resumed_at"] == [40]
 
@@ -115,12 +115,12 @@ def test_states_are_written_where_the_deck_or_what_it_includes_has_the_fix(tmp_p
         (tmp_path / "deck.in").write_text("variable restart_every index 0\nrun ${steps}\n")
         found = replace(found, folder=tmp_path)
     run = replace(plan(), case=found)
-    assert restarts.supported(run) is states
+    assert restarts.writes_restarts(run) is states
 
 
 def test_deck_that_knows_no_states_is_asked_for_none(tmp_path: Path, decks: Path) -> None:
     (decks / "box" / "liggghts.in").write_text("# deck\n")
-    with pytest.raises(Killed, match="it begins anew"):
+    with pytest.raises(Killed, match="it starts again from its beginning"):
         run(tmp_path, behaviour="kill")
     assert not works(tmp_path)
 
@@ -141,7 +141,7 @@ def test_interruption_says_where_the_run_goes_on(tmp_path: Path, engine_pid: Cal
     wait_for((work(tmp_path) / "state.40.restart.crc").exists)
     cancel.set()
     thread.join(20)
-    assert caught == ["box dry liggghts 1 was interrupted, it goes on from step 40 when it is started again"]
+    assert caught == ["box dry liggghts 1 was interrupted, it continues from step 40 when it is started again"]
     assert run(tmp_path, behaviour="hang")["resumed_at"] == [40]
 
 

@@ -1,4 +1,4 @@
-"""The whole chain with stand-ins: nothing is repeated, nothing stale is reported, failures stop nothing else."""
+"""The complete chain with stand-ins: nothing is repeated, nothing stale is reported, failures stop nothing else."""
 
 from __future__ import annotations
 

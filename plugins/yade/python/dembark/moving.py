@@ -1,4 +1,4 @@
-"""Walls that move as prescribed, in decks: facets of a mesh file, the engines that move them, and what those tell for time.csv."""
+"""Walls that move as prescribed, in decks: facets of a mesh file, the engines that move them, and their columns of time.csv."""
 
 from yade import FacetSurface, Omega, WallMotion, utils
 from yade.dembark.report import fail

@@ -102,7 +102,7 @@ class DumpWriter:
 class HistoryWriter:
     """Appends lines to time.csv: step, time, kinetic energy of the grains, force of each wall (with its glued grains) on the grains; with
     `liquid`, the CapillaryLiquid that the scene has or will have, also where its liquid is (m^3) and the number of bridges; with the
-    engines `moving` of `motion` also what `motion_values` tells."""
+    engines `moving` of `motion` also `motion_values`."""
 
     LIQUID = {"liquid_grains": "inGrains", "liquid_bridges": "inBridges", "liquid_walls": "onWalls"}
 

@@ -1,4 +1,4 @@
-"""A campaign's report as a whole, from results of a known law."""
+"""A campaign's complete report, from results of a known law."""
 
 from __future__ import annotations
 
