@@ -32,10 +32,10 @@ def suitable_step(p: Parameters, speed: float) -> float:
     """Time step (s) by `time_step_fraction`; DembarkError when grains are too soft, or it is too long, for impacts at `speed` (m/s)."""
     depth, lasts = impact(p, speed)
     if depth > DEEPEST * p.grain_diameter:
-        raise DembarkError(f"grains that meet at {speed:.3g} m/s overlap by {depth / p.grain_diameter:.3g} d",
-                           "the highest speed of the wall", f"raise youngs_modulus until it is below {DEEPEST} d")
+        raise DembarkError(f"an impact at the wall's highest speed, {speed:.3g} m/s, has an overlap of {depth / p.grain_diameter:.3g} d",
+                           f"raise youngs_modulus until it is below {DEEPEST} d")
     if lasts < SHORTEST * time_step(p):
-        raise DembarkError(f"an impact at {speed:.3g} m/s lasts {lasts / time_step(p):.3g} steps", "the highest speed of the wall",
+        raise DembarkError(f"an impact at the wall's highest speed, {speed:.3g} m/s, lasts {lasts / time_step(p):.3g} steps",
                            f"lower time_step_fraction until it lasts {SHORTEST}")
     return time_step(p)
 
