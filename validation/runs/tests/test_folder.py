@@ -10,7 +10,7 @@ from dembark.validation.runs import folder
 
 
 @pytest.mark.parametrize("launcher", ["", "srun --mpi=pmix"])
-def test_jobs_get_paths_from_every_folder_and_other_words_as_they_are(launcher: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_jobs_get_full_paths_and_other_words_as_they_are(launcher: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("lmp").touch()
     monkeypatch.setenv("DEMBARK_LIGGGHTS", "lmp")
