@@ -195,7 +195,7 @@ def controls_oblique_impact(_folder: Path) -> Iterator[Control]:
               for k, datum in enumerate(data)]
     with patch.object(oblique, "measured", lambda: closed):
         right = studied(_slipping(1.0))
-        yield Control("a contact that sticks and gives all back", right, by_scheme())
+        yield Control("a contact that sticks and returns all energy", right, by_scheme())
         yield Control("friction off", right, by_scheme(lambda one: replace(one, friction=0.0 * one.friction)))
         yield Control("friction tripled", right, by_scheme(lambda one: replace(one, friction=3.0 * one.friction)))
         yield Control("half the shear stiffness", right, studied(_slipping(0.5)))

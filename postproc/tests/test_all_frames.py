@@ -248,8 +248,8 @@ def small(monkeypatch):
 HUGE = [(["--width", "3"], "of memory"), (["--grid", "100000"], "of memory"),
         (["--grid", "99999999999999999999"], "of memory"), (["--spacing", "1e-9"], "--spacing|larger ones"),
         (["--spacing", "1e-300"], "larger ones"), (["--spacing", "0.001d"], "of memory"), (["--box", "0,1e9,0,1,0,1"], "of memory"),
-        (["--box", "0,nan,0,1,0,1"], "finite"), (["--width", "-1"], "no length"), (["--spacing", "0"], "no length"),
-        (["--grid", "0,1,1"], "no grid"), (["--grid", "-5"], "no grid"), (["--average", "0"], "--average")]
+        (["--box", "0,nan,0,1,0,1"], "finite"), (["--width", "-1"], "is not a length"), (["--spacing", "0"], "is not a length"),
+        (["--grid", "0,1,1"], "is not a grid"), (["--grid", "-5"], "is not a grid"), (["--average", "0"], "--average")]
 
 
 @pytest.mark.parametrize(("options", "message", "flags"), [

@@ -47,7 +47,7 @@ def test_select_keeps_wall_forces_beside_their_grains(two_frames):
     assert part.wall_forces["side"].tolist() == [[-4.0, 0.0, 0.5]]
 
 
-@pytest.mark.parametrize(("text", "message"), [("", "empty"), ("hello\n", "does not begin"), (None, "does not exist")])
+@pytest.mark.parametrize(("text", "message"), [("", "empty"), ("hello\n", "neither a text dump"), (None, "does not exist")])
 def test_foreign_files_are_refused(tmp_path, text, message):
     path = tmp_path / "grains.dump"
     if text is not None:

@@ -196,7 +196,7 @@ def test_wall_that_nothing_touches_and_frames_without_grains():
 
 
 @pytest.mark.parametrize(("make", "words"), [
-    (lambda: PlaneWall("w", normal=(0.0, 0.0, 0.0)).axes, "no direction"),
+    (lambda: PlaneWall("w", normal=(0.0, 0.0, 0.0)).axes, "not a direction"),
     (lambda: CylinderWall("w", -1.0), "radius"),
     (lambda: CylinderWall("w", float("nan")), "radius"),
     (lambda: MeshWall("w", np.zeros((0, 3, 3))), "triangles"),
