@@ -1,7 +1,6 @@
 """Makes the rig importable, and runs every scenario once in every program."""
 
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType
 
@@ -9,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from rig import lammps_driver, liggghts_driver, python_driver, yade_driver
+from rig import lammps_driver, liggghts_driver, python_driver, walls, yade_driver
 from rig.motion import Motion
 from rig.scenarios import SCENARIOS
 
@@ -37,16 +36,11 @@ class Motions:
                 self.done[driver, name] = python_driver.run(SCENARIOS[name])
                 return self.done[driver, name]
             skip_without({"liggghts": liggghts_driver, "yade": yade_driver, "lammps": lammps_driver}[driver])
-            if driver == "liggghts":
-                # A run takes longer to start than to compute.
-                with ThreadPoolExecutor(4) as pool:
-                    folders = [self.folder / f"liggghts-{k}" for k in range(len(SCENARIOS))]
-                    found = dict(zip(SCENARIOS, pool.map(liggghts_driver.run, SCENARIOS.values(), folders), strict=True))
-            elif driver == "lammps":
-                decks = {each: lammps_driver.deck(case) for each, case in SCENARIOS.items()}
-                found = lammps_driver.motions(self.folder / "lammps", decks, SCENARIOS)
-            else:
+            if driver == "yade":
                 found = yade_driver.run_all(SCENARIOS.values(), self.folder / "yade")
+            else:
+                one, run_all = (liggghts_driver, walls.motions) if driver == "liggghts" else (lammps_driver, lammps_driver.motions)
+                found = run_all(self.folder / driver, {each: one.deck(case) for each, case in SCENARIOS.items()}, SCENARIOS)
             self.done |= {(driver, each): motion for each, motion in found.items()}
         return self.done[driver, name]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from dembark.physics import (
@@ -18,6 +20,8 @@ from rig.motion import Motion
 from rig.scenarios import Material, Scenario, evaluate
 
 
+# A table of bridges takes as long as a run.
+@cache
 def contact(m: Material) -> Contact:
     elastic = (m.youngs_modulus, m.poisson_ratio, m.youngs_modulus, m.poisson_ratio)
     return Contact(

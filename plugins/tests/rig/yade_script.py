@@ -117,7 +117,9 @@ def run(case, arrays):
     engines[2:2] = [joint] if joint else []
     O.engines = ([PyRunner(iterPeriod=1, firstIterRun=0, initRun=True, command="rig_move()")] if move else []) + engines[:-1] + [
         PyRunner(iterPeriod=1, firstIterRun=0, initRun=True, command="rig_record()")] + engines[-1:]
-    O.run(case["steps"] + 1 - first, True)
+    # O.run() has a thread of its own, which waits for Python in every step.
+    for _ in range(case["steps"] + 1 - first):
+        O.step()
     return np.array(record.rows)
 
 

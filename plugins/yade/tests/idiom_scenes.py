@@ -191,7 +191,7 @@ def grown_later():
                 pressed(loop, [utils.wall(0, 2), *(utils.sphere((0.1 * R * (k % 2), 0, (1 + 2.1 * k) * R), R) for k in range(3))], pair,
                         dict(capillaryModel="exact") if wet else {}, gravity=(0, 0, -9.81))
                 O.dt = 1e-5
-                O.run(500, True)
+                advance(500)
                 if how == "append":  # ten times as large as all before
                     O.bodies.append([utils.sphere((12 * R, 0, 10.1 * R), 10 * R), utils.sphere((-12 * R, 0, 10.1 * R), 10 * R),
                                      utils.sphere((0, 0, 25 * R), 10 * R)])
@@ -209,7 +209,7 @@ def grown_later():
                         O.bodies[2].shape.radius *= 1.01
                         O.bodies[2].state.mass *= 1.01**3
                         O.bodies[2].state.inertia *= 1.01**5
-                    O.run(50, True)
+                    advance(50)
                     worst = {name: max(worst[name], value) for name, value in _overlaps().items()}
                 found[f"{loop} {'wet' if wet else 'dry'} {how}"] = worst | {"count": len(O.bodies) - 1}
     return found
@@ -234,7 +234,7 @@ def grown_on_facets():
             if n == 5:
                 O.bodies.append(utils.sphere((12 * R, 0, 10.1 * R), 10 * R))
             utils.growParticle(1, 1.01)
-            O.run(50, True)
+            advance(50)
             worst = {name: max(worst[name], value) for name, value in _overlaps().items()}
         found[floor] = worst | {"count": len(O.bodies) - 1}
     return found
