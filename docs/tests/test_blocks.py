@@ -44,7 +44,10 @@ RUNNERS = {
     "output": "test_liggghts_blocks.py, test_docs.py", "toml": "test_toml", "shell": "test_shell", "file": "test_shell",
     "{toctree}": "make docs", "listing": "test_listing", "picture": "test_architecture.py",
 }
-SHELL_PAGES = list(dict.fromkeys(block.page for block in blocks("shell")))
+# Pages whose commands README.md and the page of restarts have in a similar form.
+LONG = {f"docs/how-to/{page}.md" for page in ("fields", "campaigns", "moving_walls")}
+SHELL_PAGES = [pytest.param(page, id=page, marks=pytest.mark.full if page in LONG else ())
+               for page in dict.fromkeys(block.page for block in blocks("shell"))]
 
 
 def found(engine: str) -> engines.Engine:

@@ -46,7 +46,12 @@ def test_links_exist(page: Path) -> None:
     assert not missing
 
 
-@pytest.mark.parametrize("block", blocks("python"), ids=lambda block: block.place)
+def snippets(kind: str, long: str) -> list[object]:
+    """All blocks of this kind; those that contain `long` take ten seconds."""
+    return [pytest.param(block, id=block.place, marks=pytest.mark.full if long in block.text else ()) for block in blocks(kind)]
+
+
+@pytest.mark.parametrize("block", snippets("python", "brentq"))
 def test_python_snippet(block: Block, tmp_path: Path) -> None:
     (tmp_path / "snippet.py").write_text(block.text, encoding="utf-8")
     result = subprocess.run([sys.executable, "-W", "error", "snippet.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300,
@@ -85,7 +90,7 @@ def test_decks_show_what_their_pages_say(tmp_path: Path) -> None:
     assert max(held) < 0.4968e-3 < max(gap for _, gap, _ in rows)
 
 
-@pytest.mark.parametrize("block", blocks("cpp"), ids=lambda block: block.place)
+@pytest.mark.parametrize("block", snippets("cpp", "energy_lcp"))
 def test_cpp_snippet(block: Block, tmp_path: Path) -> None:
     compiler = shutil.which("c++")
     if compiler is None:

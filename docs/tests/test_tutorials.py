@@ -12,7 +12,7 @@ from dembark.validation import engines
 
 tutorials = load_script("tutorials")
 # Runs of a minute or more.
-LONG = {"first_run", "fields"}
+LONG = {"first_run", "fields", "own_case"}
 
 
 @pytest.mark.parametrize("page", [pytest.param(page, marks=pytest.mark.full if page.stem in LONG else (), id=page.stem)

@@ -3,10 +3,7 @@
 from pathlib import Path
 
 import pytest
-from rig import lammps_driver, liggghts_driver
 from rig.engine_examples import PACKAGES, ROOT, Example, bulk, outputs, programs, table, thermo
-
-from conftest import skip_without
 
 EXAMPLES = table()
 PAGE = (ROOT / "docs/how-to/engine_examples.md").read_text(encoding="utf-8")
@@ -27,8 +24,8 @@ def test_page_has_each_of_them(example: Example):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda e: e.name)
-def test_example(example: Example, tmp_path: Path):
-    skip_without({"liggghts": liggghts_driver, "lammps": lammps_driver}[example.engine])
+def test_example(example: Example, tmp_path: Path, request: pytest.FixtureRequest):
+    request.getfixturevalue(f"{example.engine}_is_there")
     package, _ = PACKAGES[example.engine]
     if not example.source.exists():
         pytest.skip(f"its examples are not there; install the package {package}")

@@ -24,7 +24,7 @@ from rig.walls import stl
 
 COUNT = int(os.environ.get("DEMBARK_STRESS", "0"))
 # A scene is small as it is: the first that fails is shown.
-RANDOM = settings(max_examples=COUNT or 8, derandomize=not COUNT, deadline=None, database=None, report_multiple_bugs=False,
+RANDOM = settings(max_examples=COUNT or 5, derandomize=not COUNT, deadline=None, database=None, report_multiple_bugs=False,
                   phases=(Phase.explicit, Phase.generate), suppress_health_check=list(HealthCheck))
 
 

@@ -65,11 +65,15 @@ MOTIONS = {
 }
 
 
+# A law knows of a wall's kind nothing but place and velocity: these are tried on one wall of each engine, and on its meshes.
+OF_THE_LAW = {"exponential", "elastic limit", "constant torque"}
+
+
 def parts():
     """(kind, case) of all, with the case in the frame of its surface; `around` is for cylinders only."""
     for kind, (surface, _, _) in SURFACES.items():
         for name, case in CASES.items():
-            if (name == "around") <= (surface.shape == "cylinder"):
+            if (name == "around") <= (surface.shape == "cylinder") and (name in OF_THE_LAW) <= (kind in ("plane", "mesh")):
                 yield kind, name, replace(walls.moved_with(case, surface.velocity), name=f"{kind}, {name}")
 
 

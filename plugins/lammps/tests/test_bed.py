@@ -34,8 +34,9 @@ def test_grains_collide_and_touch_the_floor(serial):
     assert np.abs(held).max() > 1e-3
 
 
-@pytest.mark.parametrize(("ranks", "newton", "head"), [(1, "on", ""), (2, "off", "processors 2 1 1"), (2, "on", "processors 1 2 1"),
-                                                       (1, "off", "atom_modify sort 100 0.005")])
+@pytest.mark.parametrize(("ranks", "newton", "head"), [
+    (1, "on", ""), (2, "off", "processors 2 1 1"), pytest.param(2, "on", "processors 1 2 1", marks=pytest.mark.full),
+    (1, "off", "atom_modify sort 100 0.005")])
 def test_parallel_runs_give_the_same(serial, tmp_path, ranks, newton, head):
     # Sums in another order: chaos has 1000 steps to grow round-off.
     found = run(tmp_path, bed("run 1000", newton=newton, head=head), ranks)

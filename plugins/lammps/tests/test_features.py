@@ -73,7 +73,7 @@ LEAVE = {
 }
 
 
-@pytest.mark.parametrize("name", LEAVE)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.full) if name == "evaporate" else name for name in LEAVE])
 def test_two_ranks_give_what_one_gives(tmp_path, name):
     commands, (old, new) = LEAVE[name]
     text = bed(commands).replace(old, new, 1)
@@ -204,7 +204,8 @@ run 4000
 
 
 @pytest.mark.parametrize(("options", "style", "ranks"), [
-    ("", "rigid molecule", 1), ("", "rigid/small molecule", 2), ("normal hooke 1.0", "rigid/small molecule", 1)])
+    ("", "rigid molecule", 1), pytest.param("", "rigid/small molecule", 2, marks=pytest.mark.full),
+    ("normal hooke 1.0", "rigid/small molecule", 1)])
 def test_rigid_bodies_rebound_as_their_restitution_says(tmp_path, options, style, ranks):
     """Two clumps of two spheres collide, then one hits a wall: what damps is the mass of the body, not that of a sphere."""
     material = Material(youngs_modulus=5e6, restitution=0.5)

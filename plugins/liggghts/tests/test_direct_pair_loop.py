@@ -57,7 +57,7 @@ PULLED = LIQUID.replace("run 1000\n", "run 998\ngroup two type 2\ndisplace_atoms
 
 
 @pytest.mark.parametrize(("ranks", "lanes", "account"), [
-    (1, 2, ""), pytest.param(2, 4, "", marks=pytest.mark.full), pytest.param(2, 8, "", marks=pytest.mark.full), (1, 8, f"{FIX}\n")])
+    *(pytest.param(*each, "", marks=pytest.mark.full) for each in ((1, 2), (2, 4), (2, 8))), (1, 8, f"{FIX}\n")])
 def test_liquid_of_bridges_that_a_displacement_breaks_is_given_back(tmp_path, monkeypatch, ranks, lanes, account):
     """They are longer than they may be in a set-up, which changes nothing, and break in the step after it."""
     words = {"deck": PULLED.replace("run 998", f"{account}run 998"), "cohesion": "cohesion capillary", "settings": "carried_liquid on"}
@@ -69,6 +69,7 @@ def test_liquid_of_bridges_that_a_displacement_breaks_is_given_back(tmp_path, mo
     assert held == pytest.approx(other, rel=1e-9)
 
 
+@pytest.mark.full
 def test_same_motion_on_two_ranks(tmp_path):
     words = {"cohesion": "cohesion capillary", "rolling": "", "settings": ""}
     assert deviation(frames(tmp_path / "two", ranks=2, **words), frames(tmp_path / "one", **words)) < 1e-10
@@ -103,7 +104,8 @@ def asked(folder, every, **words) -> tuple[np.ndarray, np.ndarray]:
     return np.array(told, dtype=float), np.stack(read_dump(folder / "grains.dump")[1])
 
 
-@pytest.mark.parametrize(("cohesion", "settings"), [("cohesion capillary", ""), ("", "presliding partial_slip")])
+@pytest.mark.parametrize(("cohesion", "settings"), [
+    pytest.param("cohesion capillary", "", marks=pytest.mark.full), ("", ""), ("", "presliding partial_slip")])
 def test_the_virial_is_that_of_the_engines_loop_and_does_not_change_the_run(tmp_path, cohesion, settings):
     words = {"cohesion": cohesion, "settings": settings}
     ours, frames = asked(tmp_path / "ours", 100, rolling="", **words)

@@ -48,9 +48,14 @@ def test_copies_once(tmp_path):
     assert "MINE" in lines[0] and len(lines) == len(set(lines)) == 21
 
 
-def test_every_included_header_is_there(tmp_path):
-    source = stand_in(tmp_path / "src")
-    install(source)
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    folder = stand_in(tmp_path_factory.mktemp("installed") / "src")
+    install(folder)
+    return folder
+
+
+def test_every_included_header_is_there(source):
     for path in [*source.glob("*_model_*.h"), *source.glob("fix_*"), *source.glob("*_fix.*"), *(source / "dembark").rglob("*.hpp")]:
         for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.MULTILINE):
             ours = name.startswith("dembark/") or path.suffix == ".hpp" or any(
@@ -58,9 +63,7 @@ def test_every_included_header_is_there(tmp_path):
             assert not ours or (path.parent / name).exists() or (source / name).exists(), f"{path.name}: {name}"
 
 
-def test_whitelist_is_what_liggghts_dembark_compiles(tmp_path):
-    source = stand_in(tmp_path / "src")
-    install(source)
+def test_whitelist_is_what_liggghts_dembark_compiles(source):
     prefixed = [[f"{kind}_{model}".removeprefix("NORMAL_").upper() for kind, model in zip(KINDS, each, strict=True)] for each in LIST]
     expected = {f"GRAN_MODEL({', '.join(each)})" for each in prefixed}
     assert len(expected) == 20

@@ -89,7 +89,8 @@ HARMLESS = {
 }
 
 
-@pytest.mark.parametrize("name", HARMLESS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.full) if name in ("4 ranks", "shrink-wrapped top") else name
+                                  for name in HARMLESS])
 def test_what_must_not_matter(serial, tmp_path, name):
     ranks, edit = HARMLESS[name]
     text = edit(bed("run 3000", ranks=ranks))
@@ -98,7 +99,7 @@ def test_what_must_not_matter(serial, tmp_path, name):
     assert_same_contacts(contacts(serial), contacts(tmp_path), 1e-8)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.full), 2])
 def test_grains_deleted_beside_bridges(tmp_path, ranks):
     """Bridges to a deleted grain are gone, those of the others unharmed, whatever is on the other rank."""
     cut = "group gone id 5 22 37\nrun 2000\ndelete_atoms group gone compress no\nrun 100"
@@ -113,7 +114,7 @@ def test_grains_deleted_beside_bridges(tmp_path, ranks):
     assert len(last(tmp_path)) == 61
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.full), 2])
 def test_grains_created_between_runs_leave_the_others_as_they_are(tmp_path, ranks):
     """Contacts across borders keep their histories: in stock LIGGGHTS a new atom takes the place of the ghost that held one."""
     new = "create_atoms 1 single 0.003 0.003 0.05 units box\nset group all vz 0.0\nset atom 65 diameter 0.005 density 2500\n"
@@ -123,7 +124,7 @@ def test_grains_created_between_runs_leave_the_others_as_they_are(tmp_path, rank
     assert_same_contacts(contacts(tmp_path / "without"), contacts(tmp_path / "with"), 1e-12)
 
 
-@pytest.mark.parametrize("every", [1, 10])
+@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.full), 10])
 def test_grains_that_grow_are_as_large_across_a_border(tmp_path, every):
     """Copies have the new radius in the same step, so that ranks and periods do not matter."""
     grow = f"variable width equal 0.0045+5e-7*step\nfix grow all adapt {every} atom diameter v_width\n"
@@ -133,7 +134,7 @@ def test_grains_that_grow_are_as_large_across_a_border(tmp_path, every):
     assert_same_contacts(contacts(tmp_path / "1"), contacts(tmp_path / "2"), 1e-8)
 
 
-@pytest.mark.parametrize("ranks", [(1, 1), (2, 2), (1, 2), (2, 1)])
+@pytest.mark.parametrize("ranks", [*(pytest.param((n, n), marks=pytest.mark.full) for n in (1, 2)), (1, 2), (2, 1)])
 def test_restart_keeps_every_value(tmp_path, ranks):
     """read_restart, also on another number of ranks: what the pairs held at the last build of the lists comes back to the bit."""
     first, second = ranks
@@ -147,6 +148,7 @@ def test_restart_keeps_every_value(tmp_path, ranks):
         assert (before[pair] == after[pair]).all(), pair
 
 
+@pytest.mark.full
 def test_statistics_do_not_depend_on_the_ranks(tmp_path):
     """500 grains fall into a bed: kinetic energy and number of bridges on the way agree within what two packings differ."""
     create = re.sub(r"create_atoms.*\n?", "", packing(BED, "run 1").split("neighbor")[0].split("processors 2 1 1\n")[1])

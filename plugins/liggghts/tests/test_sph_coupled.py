@@ -128,7 +128,7 @@ def test_says_what_is_wrong(name: str, tmp_path: Path) -> None:
     assert done.code != 0 and message in done.error, done.error or done.output[-800:]
 
 
-@pytest.mark.parametrize("name", ["mass", "two groups", "weight", "overlap"])
+@pytest.mark.parametrize("name", ["mass", "overlap", *(pytest.param(name, marks=pytest.mark.full) for name in ("two groups", "weight"))])
 def test_what_one_rank_finds_wrong_is_a_line_of_its_own(name: str, tmp_path: Path) -> None:
     """If that rank ended the run by itself, its message could begin in the middle of another's line, with the launcher's words after it."""
     old, new, message = REFUSED[name]
@@ -138,7 +138,7 @@ def test_what_one_rank_finds_wrong_is_a_line_of_its_own(name: str, tmp_path: Pat
     assert done.code != 0 and "MPI_ABORT" not in done.output + done.error
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_overlaps_are_told_at_the_first_run_only(ranks: int, tmp_path: Path) -> None:
     """Fluid that was put on a block is refused; states that the fluid has reached are not: a later run, and one from a state file."""
     scene, jump = dam(), "displace_atoms g1 move 0.1 0 0 units box"

@@ -112,7 +112,7 @@ def collapse(settle=1500, steps=3000, samples=15, **options):
         if part == samples // 3:
             for gate in gates:
                 O.bodies[gate].state.vel = Vector3(0, 0.05, 0.8)
-        O.run((settle if part < samples // 3 else steps // 2) // (samples // 3), True)
+        advance((settle if part < samples // 3 else steps // 2) // (samples // 3))
         rows.append(account.energies())
     return {"rows": rows, "grains": sum(isinstance(b.shape, Sphere) for b in O.bodies), "step": account.step, "iter": O.iter,
             "handed": O.engines[2].handedOver, "law": O.engines[3].lawDispatcher.functors[0].dissipatedEnergy()}
@@ -134,7 +134,7 @@ def box_gate():
     """The gate is a Box that is pushed into the column."""
     account, gates = column(gate=utils.box((0.036, 0.013, 0.03), (0.01, 0.03, 0.06), fixed=True), count=4)
     O.bodies[gates[0]].state.vel = Vector3(-0.1, 0, 0.1)
-    O.run(1200, True)
+    advance(1200)
     return account.energies()
 
 
@@ -147,7 +147,7 @@ def drum(**law):
     held, guided = grain((0, 0.0, -0.0174), R, (0.05, 0, 0), fixed=True), grain((0.0005, 0, 0.0165), R, (0, 0, -0.2))
     guided.state.blockedDOFs = "zX"
     account = scene_with([shape, held, guided, *grains], ROLLING, law, gravity=(0, 0, -9.81), step=1e-5)
-    O.run(6000, True)
+    advance(6000)
     return account.energies()
 
 
@@ -166,7 +166,7 @@ def periodic():
     """Grains that fly about in a periodic cell."""
     account = scene_with(flying(4, 0.006, 0.5), WET, dict(capillaryModel="willett"), step=1e-5)
     O.periodic, O.cell.hSize = True, Matrix3(0.024, 0, 0, 0, 0.024, 0, 0, 0, 0.024)
-    O.run(2000, True)
+    advance(2000)
     return account.energies()
 
 
@@ -200,7 +200,7 @@ def briefly():
     account, gates = column(wet=True, count=4)
     for gate in gates:
         O.bodies[gate].state.vel = Vector3(0.3, 0, 0.5)
-    O.run(400, True)
+    advance(400)
     return account.energies()
 
 
@@ -209,15 +209,15 @@ def save_load():
     found = {}
     for ending in ("xml", "yade.gz", "bin"):
         account, _ = column(wet=True, count=3)
-        O.run(500, True)
+        advance(500)
         name = f"energy.{ending}"
         O.save(name)
         before = account.energies()
-        O.run(300, True)
+        advance(300)
         straight = account.energies()
         O.load(name)
         after = dembark.energies()
-        O.run(300, True)
+        advance(300)
         found[ending] = {"before": before, "after": after, "straight": straight, "resumed": dembark.energies()}
         os.remove(name)
     return found
@@ -231,7 +231,7 @@ def come_and_go():
 
     def after(act):
         act()
-        O.run(200, True)
+        advance(200)
         rows.append(account.energies())
 
     def fly():
@@ -262,7 +262,7 @@ def in_a_step():
                          between=[ask("between")])
     builtins.account_ = account
     O.engines = [*O.engines, ask("after")]
-    O.run(50, True)
+    advance(50)
     return {"seen": builtins.seen, "end": account.energies(), "step": account.step}
 
 
@@ -271,17 +271,17 @@ def set_in_a_step():
     kick = PyRunner(iterPeriod=7, command="O.forces.addF(0, (0, 0, 1e-3))")
     account = scene_with([grain((0, 0, 0), R, (0, 0, 0.1)), grain((1, 0, 0))], between=[kick])
     O.engines = [*O.engines, PyRunner(iterPeriod=10, command="O.bodies[1].state.vel += Vector3(0.01, 0, 0)")]
-    O.run(92, True)
+    advance(92)
     return account.energies()
 
 
 def reset():
     account = scene_with([utils.wall(0, 2), grain((0, 0, 0.0024), R, (0.2, 0, -0.1))], gravity=(0, 0, -9.81))
-    O.run(300, True)
+    advance(300)
     before = account.energies()
     account.reset()
     zero = account.energies()
-    O.run(300, True)
+    advance(300)
     return [before, zero, account.energies()]
 
 
@@ -292,7 +292,7 @@ def table():
 
     builtins.writer = dembark.EnergyWriter()
     O.engines = [*O.engines, PyRunner(iterPeriod=10, command="writer.write()")]
-    O.run(31, True)
+    advance(31)
     return {"text": open("energies.csv", encoding="utf-8").read(), "keys": account.keys(),
             "items": [list(item) for item in account.items()],
             "energies": account.energies(), "found": dembark.energies()}
@@ -351,7 +351,7 @@ def other_law():
         ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb()]),
         InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_FrictPhys()], [Law2_ScGeom_FrictPhys_CundallStrack()]),
         EnergyAccount(), NewtonIntegrator()]
-    O.run(3, True)
+    advance(3)
 
 
 write_results(globals())

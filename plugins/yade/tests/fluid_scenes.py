@@ -1,6 +1,6 @@
 """Runs inside YADE: `PYTHONPATH=. yade -n -x fluid_scenes.py out.json scene...`. Bodies in the fluid of SphFluid."""
 
-from scene_results import refusal, write_results
+from scene_results import advance, refusal, write_results
 from yade import dembark, utils
 
 DX, SOUND, G = 0.02, 25.0, 9.81
@@ -57,7 +57,7 @@ def falling_plane():
     body = block((low[0] + 0.05, low[1] + 0.05, 0), 8.0, (0.0133, 0.0133, 0.0133), (0.2, -1.0 + 0.5 * STEP * G, 0), (0, 0, 2.0), plane=True)
     fluid.addBody(body, dembark.lattice(low, (low[0] + 0.1, low[1] + 0.1), DX))
     # The engine takes its first step with the second one of the scene.
-    O.run(801, True)
+    advance(801)
     return tell(fluid, body)
 
 
@@ -65,7 +65,7 @@ def falling_space():
     fluid = pool((0, 0, -G), (0, 0, 0), (0.2, 0.2, 0.1), 0.3)
     body = block((0.09, 0.11, 0.23), 0.4096, (4.4e-4, 4.4e-4, 4.4e-4), (0, 0.1, -1.0 + 0.5 * STEP * G), (1.0, 2.0, 3.0))
     fluid.addBody(body, dembark.lattice((0.05, 0.07, 0.19), (0.13, 0.15, 0.27), DX))
-    O.run(401, True)
+    advance(401)
     return tell(fluid, body)
 
 
@@ -77,7 +77,7 @@ def moved():
     fluid.addBody(body, dembark.lattice((0.16, 0.18), (0.24, 0.28), DX))
     O.engines = [*O.engines[:-1], walls, O.engines[-1]]
     walls.start()
-    O.run(301, True)
+    advance(301)
     return tell(fluid, body)
 
 
@@ -111,7 +111,7 @@ def floats_on_substeps():
         low = (0.14, 0.16)
         body = block((low[0] + 0.06, low[1] + 0.06, 0), 7.2, (0.0173, 0.0173, 0.0173), plane=True)
         fluid.addBody(body, dembark.lattice(low, (low[0] + 0.12, low[1] + 0.12), DX))
-        O.run(500 * substeps + 1, True)
+        advance(500 * substeps + 1)
         found[str(substeps)] = [list(O.bodies[body].state.pos), fluid.steps]
     return found
 
@@ -127,14 +127,14 @@ def saved():
         O.dt = STEP / 3
         body = block((0.19, 0.2, 0), 8.0, (0.0133, 0.0133, 0.0133), (0.2, -3.0, 0), (0, 0, 2.0), plane=True)
         fluid.addBody(body, dembark.lattice((0.14, 0.15), (0.24, 0.25), DX))
-        O.run(200, True)
+        advance(200)
         O.save("fluid." + ending, quiet=True)
-        O.run(200, True)
+        advance(200)
         ends = [tell(fluid, body)]
         for _ in range(2):
             O.load("fluid." + ending, quiet=True)
             early = dembark.fluid_engine().fluidTime
-            O.run(200, True)
+            advance(200)
             ends.append(tell(dembark.fluid_engine(), body))
         found[ending] = [ends[0] == ends[1] == ends[2], early, ends[0]["time"]]
     return found
@@ -148,7 +148,7 @@ def written():
     writer = dembark.FluidWriter(((0, 0.4), (0, 0.3), (-0.01, 0.01)), {"block": body})
     globals()["writer"] = writer
     O.engines = [*O.engines[:-1], PyRunner(command="writer.frame(); writer.row()", iterPeriod=50, initRun=True), O.engines[-1]]
-    O.run(101, True)
+    advance(101)
     with open("fluid.dump", encoding="ascii") as dump, open("fluid.csv", encoding="ascii") as rows:
         return {"dump": dump.read(), "rows": rows.read(), "mass": fluid.particleMass()}
 
@@ -212,7 +212,7 @@ def messages():
     }
     fluid.addBody(body, [(0.1, 0.15, 0)])
     said["twice"] = refusal(lambda: fluid.addBody(body, [(0.1, 0.15, 0)]))
-    O.run(1, True)
+    advance(1)
     said["late"] = refusal(lambda: fluid.addWall([(0, 0, 0)]))
     O.engines[-1].gravity = Vector3(0, -1, 0)
     said["gravity"] = refusal(lambda: go(1))

@@ -4,7 +4,7 @@ import math
 import os
 import random
 
-from scene_results import write_results
+from scene_results import advance, write_results
 from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5, surfaceTension=0.072, contactAngle=0.35)
@@ -214,7 +214,7 @@ def conserved(step=1e-5, blocks=15, length=100):
     O.dt = step
     rows = []
     for _ in range(blocks):
-        O.run(length, True)
+        advance(length)
         rows.append(tallies(engine, 0))
     solid = sum(4 / 3 * math.pi * b.shape.radius**3 for b in O.bodies if isinstance(b.shape, Sphere))
     return {"begin": engine.content * solid + 1e-9, "rows": rows}
@@ -230,7 +230,7 @@ def save_load():
     found = {}
     for ending in ("xml", "yade.gz", "bin"):
         engine = cloud()
-        O.run(700, True)
+        advance(700)
         name = f"liquid.{ending}"
         O.save(name)
         exact = lambda e: [float(x).hex() for x in (*e.liquid, *e.pools, e.inBridges(), e.lost)]
@@ -240,7 +240,7 @@ def save_load():
         ends = []
         for _ in range(2):
             O.load(name)
-            O.run(300, True)
+            advance(300)
             ends.append(exact(O.engines[3]))
         os.remove(name)
         found[ending] = {"before": before, "after": after, "ends": ends}
@@ -282,18 +282,18 @@ def messages():
 def without_engine():
     engine = scene_with([held((0, 0, 0)), held((TOUCH, 0, 0))])
     O.engines = [e for e in O.engines if e is not engine and not isinstance(e, CapillaryLiquid)]
-    O.run(3, True)
+    advance(3)
 
 
 def without_law():
     scene_with([held((0, 0, 0))])
     O.engines[2].lawDispatcher.functors[0].carriedLiquid = False
-    O.run(1, True)
+    advance(1)
 
 
 def fixed_volumes_too():
     scene_with([held((0, 0, 0)), held((TOUCH, 0, 0))], pair=dict(bridgeVolume=1e-11))
-    O.run(1, True)
+    advance(1)
 
 
 write_results(globals())

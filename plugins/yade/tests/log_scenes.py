@@ -66,7 +66,7 @@ def pair(mass=(50.0, 50.0), stiffness=(2e7, 2e7), speed=1.0, turn=0.01, **more):
     bodies = [log((0, 0, 0), 0.1, mass[0], (speed, 0, 0)), log((0.25, 0, 0), 0.15, mass[1], material="other")]
     engine = setting(bodies, dt, stiffness={"log": stiffness[0], "other": stiffness[1]}, **more)
     begin = kinetic()
-    O.run(int(1.5 * math.pi / turn), True)
+    advance(int(1.5 * math.pi / turn))
     return {"velocity": [b.state.vel[0] for b in O.bodies], "outputs": outputs(engine), "peak": speed * math.sqrt(k * reduced),
             "begin": begin,
             "end": kinetic(), "duration": math.pi / omega, "reduced": reduced, "dt": dt, "stiffness": engine.stiffness}
@@ -105,12 +105,12 @@ def wall():
                        "outputs": outputs(engine)}
     engine = setting([floor(), log((0, 0.1, 0), 0.1, mass)], dt, stiffness=s, walls=[dict(bodies=[0], stiffness=local)])
     O.bodies[0].state.vel = (0, speed, 0)
-    O.run(4000, True)
+    advance(4000)
     found["moving"] = O.bodies[1].state.vel[1]
     engine = setting([log((0, 0, 0), 0.1, 1.0), log((0.2, 0, 0), 0.1, mass)], dt, stiffness=s)
     O.bodies[0].state.blockedDOFs = "xyzXYZ"
     O.bodies[0].state.vel = (speed, 0, 0)
-    O.run(8000, True)
+    advance(8000)
     found["held log"] = O.bodies[1].state.vel[0]
     return found
 
@@ -138,7 +138,7 @@ def rest():
     found = {"fastest": max(speeds), "contacts": contacts(engine), "weight": mass * GRAVITY, "outputs": outputs(engine)}
     for start in (True, False):
         engine = setting([log((0, 0, 0), 0.1, 1.0, (1.0, 2.0, 0), 3.0)], 1e-3, GRAVITY, stiffness=s, velocityAtStart=start)
-        O.run(100, True)
+        advance(100)
         found[f"thrown {start}"] = [*O.bodies[0].state.pos, O.bodies[0].state.angVel[2]]
     return found
 
@@ -152,7 +152,7 @@ def pile():
     engine = setting(bodies, 2e-5, GRAVITY, stiffness=1e7, contactDamping=3e3, friction=dict(static=0.4, kinetic=0.3, slip=1e-3),
                      walls=[dict(bodies=0, stiffness=3e7, name="floor"), dict(bodies=1, stiffness=3e7, name="left"),
                             LogWall(bodies=[2], stiffness=3e7, name="right")])
-    O.run(60000, True)
+    advance(60000)
     forces = {name: list(engine.wallForce(name)) for name in ("floor", "left", "right")}
     net = {b.id: O.forces.f(b.id)[1] for b in O.bodies if b.dynamic}
     return {"forces": forces, "weight": 10 * mass * GRAVITY, "net": net, "fastest": max(b.state.vel.norm() for b in O.bodies),
@@ -190,7 +190,7 @@ def oblique():
 
     engine = setting([log((0, 0, 0), 0.1, 30.0, (2.0, 0, 0), 5.0), log((0.21, 0.12, 0), 0.14, 60.0)], 1e-6, stiffness=2e7, friction=0.4)
     begin, energy = sums(), kinetic()
-    O.run(8000, True)
+    advance(8000)
     return {"begin": begin, "end": sums(), "energy": [energy, kinetic()], "outputs": outputs(engine),
             "spins": [b.state.angVel[2] for b in O.bodies],
             "flat": max(abs(b.state.pos[2]) + abs(b.state.vel[2]) for b in O.bodies)}
@@ -214,26 +214,26 @@ def save_load():
     for ending in ("xml", "yade.gz", "bin"):
         name = f"impacts-{ending}.txt"
         engine = heap(impactsFile=name, velocityAtStart=True)
-        O.run(12000, True)
+        advance(12000)
         O.save(f"logs.{ending}")
         half = open(name, encoding="utf-8").read()
-        O.run(more, True)
+        advance(more)
         straight, lines, end = motion(), open(name, encoding="utf-8").read(), outputs(engine)
         O.load(f"logs.{ending}")
         engine = O.engines[1]
         O.save(f"again.{ending}")
         loaded = outputs(engine)
-        O.run(more, True)
+        advance(more)
         resumed, twice, last = motion(), open(name, encoding="utf-8").read(), outputs(engine)
         O.load(f"again.{ending}")
-        O.run(more, True)
+        advance(more)
         found[ending] = {"straight": straight, "resumed": resumed, "again": motion(), "lines": lines, "twice": twice, "half": half,
                          "end": end,
                          "last": last, "loaded": loaded, "stiffness": O.engines[1].stiffness, "friction": O.engines[1].friction,
                          "walls": [[w.name, w.stiffness, w.bodies, w.friction] for w in O.engines[1].walls]}
         # A new time step takes the histories along.
         O.dt *= 0.5
-        O.run(10, True)
+        advance(10)
         found[ending]["half step"] = outputs(O.engines[1])
         for file in (f"logs.{ending}", f"again.{ending}", name):
             os.remove(file)
@@ -241,14 +241,14 @@ def save_load():
     engine = heap(velocityAtStart=True)
     builtins.save = lambda: O.save("middle.bin")
     O.engines = [*O.engines[:2], PyRunner(command="save()", iterPeriod=9000, firstIterRun=9000), O.engines[2]]
-    O.run(9500, True)
+    advance(9500)
     straight, end = motion(), outputs(engine)
     O.load("middle.bin")
     begin = O.iter
-    O.run(9500 - begin, True)
+    advance(9500 - begin)
     found["middle"] = {"begin": begin, "straight": straight, "resumed": motion(), "end": end, "last": outputs(O.engines[1])}
     engine = heap(impactsFile="lost.txt")
-    O.run(3000, True)
+    advance(3000)
     O.save("lost.bin")
     os.remove("lost.txt")
     O.load("lost.bin")
@@ -265,7 +265,7 @@ def other_format():
     lines = {}
     for number in ("0", "2"):
         heap()
-        O.run(10, True)
+        advance(10)
         O.save("other.xml")
         text = open("other.xml", encoding="utf-8").read()
         text, found = re.subn(r'(class_name="yade::LcpImpact" tracking_level="\d" version=)"\d+"', rf'\1"{number}"', text)
@@ -282,7 +282,7 @@ def records():
     engine = setting([floor(-0.1), log((0, 0, 0), 0.1, 50.0, (1.0, 0, 0)), log((0.25, 0, 0), 0.1, 50.0),
                       log((1, 0.03, 0), 0.1, 40.0, (0, -3.0, 0))],
                      1e-6, stiffness=2e7, walls=[dict(bodies=[0], stiffness=2e7)], impactsFile="records.txt")
-    O.run(80000, True)
+    advance(80000)
     return {"text": open("records.txt", encoding="utf-8").read(), "outputs": outputs(engine)}
 
 

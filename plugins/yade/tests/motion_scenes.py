@@ -52,7 +52,7 @@ def place():
         corner = lambda: O.bodies[0].state.pos + O.bodies[0].state.ori * O.bodies[0].shape.vertices[0]
         rows = [[0.0, *corner()]]
         for _ in range(30):
-            O.run(700, True)
+            advance(700)
             rows.append([O.iter * step, *corner()])
         found[motion.split()[0]] = rows
     return found
@@ -113,7 +113,7 @@ def shaken():
             first, rows = momentum(states) + 0.5 * step * mass * Vector3(0, 0, -9.81), []
             every = round(2e-3 / step)
             for part in range(20):
-                O.run(every if part else every + 1, True)
+                advance(every if part else every + 1)
                 n = O.iter - 1
                 # v(n+1/2) less the second half of step n
                 load = sum((O.forces.f(k) for k in ids), Vector3.Zero)
@@ -158,12 +158,12 @@ def reloaded():
     """A run that goes on, and the same from where it was saved on the way: work, impulse, and places of all bodies."""
     def result():
         moves = next(e for e in O.engines if isinstance(e, WallMotion))
-        O.run(400, True)
+        advance(400)
         return {"walls": [[*b.state.pos, *b.state.ori, *b.state.vel] for b in O.bodies if isinstance(b.shape, Facet)],
                 "sums": [*moves.impulse, moves.work], "grains": [list(b.state.pos) for b in O.bodies if isinstance(b.shape, Sphere)]}
 
     scene(f"{SHAKE} {ROCK}")
-    O.run(300, True)
+    advance(300)
     O.save("motion.yade.gz", quiet=True)
     found = [result()]
     O.load("motion.yade.gz", quiet=True)

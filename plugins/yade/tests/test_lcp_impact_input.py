@@ -126,7 +126,7 @@ def test_wrong_input_is_one_line(said, number):
     ("scene()\nnewton.damping = 0.2\nO.engines = [ForceResetter(), LcpImpact(stiffness=1e7), newton]\nO.run(2, True)", ("damping is 0.2",),
      2),
     ("scene()\ndembark.log((0, 0, 0), 0.1, -3)", ("log: mass -3", "> 0 kg"), 2),
-    ("scene()\ndembark.drum((0, 0, 0), 1, axis='w')", ("drum: axis 'w'", "x, y or z"), 2),
+    pytest.param("scene()\ndembark.drum((0, 0, 0), 1, axis='w')", ("drum: axis 'w'", "x, y or z"), 2, marks=pytest.mark.full),
     ("LcpImpact(theta=2)", ("LcpImpact: theta", "not 2"), 2)])
 def test_line_and_code_of_a_run(yade, call, parts, code):
     done = run(yade, call)

@@ -8,7 +8,7 @@ SCENES = ("dry", "wet", "partial_slip", "elastic_limit", "carried", "periodic", 
 
 @pytest.fixture(scope="module")
 def found(yade):
-    return yade.scenes(*SCENES, "coincident", "crowd", "cell", "callback", "said", "no_number", script="loop_scenes.py")
+    return yade.scenes(*SCENES, "coincident", "crowd", "cell", "callback", "said", "no_number", "interpreter", script="loop_scenes.py")
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -48,7 +48,7 @@ def test_callbacks_are_called_by_the_stock_loop(found):
     assert (short["bodies"], short["contacts"]) == (stock["bodies"], stock["contacts"])
 
 
-@pytest.mark.parametrize("lanes", ["2", "4", "8"])
+@pytest.mark.parametrize("lanes", ["2", *(pytest.param(lanes, marks=pytest.mark.full) for lanes in "48")])
 def test_packs_of_any_width_give_the_same_bits(yade, found, monkeypatch, lanes):
     monkeypatch.setenv("DEMBARK_LANES", lanes)
     narrower = yade.scenes("crowd", "many_laws", script="loop_scenes.py")
@@ -77,8 +77,8 @@ def test_two_threads_sum_forces_in_another_order_only(yade, found):
     assert found["cell"]["stock"]["bridges"] > 20
 
 
-def test_python_keeps_what_it_knows_of_the_thread(yade):
-    assert yade.scenes("interpreter", script="loop_scenes.py")["interpreter"] == {"stock": [1] * 3, "short": [1, 2, 3]}
+def test_python_keeps_what_it_knows_of_the_thread(found):
+    assert found["interpreter"] == {"stock": [1] * 3, "short": [1, 2, 3]}
 
 
 def test_mistakes_are_told_in_one_line(found):

@@ -11,8 +11,7 @@ from dembark.physics.young_laplace import NoBridge, bridge, rupture, rupture_gap
 ANGLES = [0.0, np.radians(25.0), np.radians(60.0)]
 
 
-@pytest.mark.parametrize("angle", ANGLES)
-@pytest.mark.parametrize("volume", [1e-5, 3e-2])
+@pytest.mark.parametrize(("volume", "angle"), [*zip((1e-5, 3e-2, 1e-5), ANGLES, strict=True)])
 def test_force_is_the_derivative_of_the_surface_energy(volume, angle):
     end = rupture_gap(volume, angle)
     for part in (0.05, 0.5, 0.9):
@@ -22,7 +21,7 @@ def test_force_is_the_derivative_of_the_surface_energy(volume, angle):
         assert bridge(volume, gap, angle).force == pytest.approx(slope, rel=1e-4)
 
 
-@pytest.mark.parametrize("angle", ANGLES)
+@pytest.mark.parametrize("angle", ANGLES[::2])
 def test_small_touching_bridge(angle):
     limit = 2.0 * np.pi * np.cos(angle)
     coarse, fine = (limit - bridge(v, 0.0, angle).force for v in (1.6e-6, 1e-7))
@@ -37,8 +36,7 @@ def test_solution_is_what_was_asked_for():
     assert b.force == pytest.approx(2.0 * np.pi * b.neck_radius - np.pi * b.neck_radius**2 * b.pressure)
 
 
-@pytest.mark.parametrize(("angle", "fit_error"), [(0.0, 0.01), (np.radians(20.0), 0.04)])
-@pytest.mark.parametrize("volume", [1e-6, 1e-4, 1e-3])
+@pytest.mark.parametrize(("volume", "angle", "fit_error"), [(1e-6, 0.0, 0.01), (1e-3, 0.0, 0.01), (1e-4, np.radians(20.0), 0.04)])
 def test_rupture_is_near_lians_fit(volume, angle, fit_error):
     """Lian, Thornton & Adams (1993) fitted a straight line in the angle to their solutions of the same equation."""
     assert rupture_gap(volume, angle) == pytest.approx((1.0 + 0.5 * angle) * volume ** (1.0 / 3.0), rel=fit_error)
@@ -61,7 +59,7 @@ def test_ranges(volume, gap, angle, message):
         bridge(volume, gap, angle)
 
 
-@settings(max_examples=3, deadline=None, derandomize=True)
+@settings(max_examples=2, deadline=None, derandomize=True)
 @given(volume=st.floats(-6.0, -1.0).map(lambda e: 10.0**e), degrees=st.floats(0.0, 60.0))
 @example(volume=0.1, degrees=29.0)
 def test_engines_force_law_against_the_reference(volume, degrees):

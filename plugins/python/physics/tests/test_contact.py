@@ -161,7 +161,7 @@ def test_friction_limit_is_that_of_the_chosen_normal_force(restitution, speed, n
     and dashpot; a bridge is in neither."""
     for limit in ("elastic", "total"):
         contact = replace(CONTACT, restitution=restitution, normal_law=normal_law, bridge_volume=volume, surface_tension=0.072,
-                          friction=replace(ROUGH, friction_limit=limit, presliding=presliding))
+                          capillary_model="willett", friction=replace(ROUGH, friction_limit=limit, presliding=presliding))
         spring = replace(contact, restitution=1.0)
         body = Body(radius=RADIUS, mass=MASS, position=(0.0, 0.0, RADIUS + 1e-9), velocity=(50.0, 0.0, -speed))
         motion = drop(contact, body, time_step=2e-6, steps=120, gravity=(0.0, 0.0, 0.0))
