@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,8 @@ import pytest
 
 from dembark.validation import engines
 from dembark.validation.case import folders
+from dembark.validation.cli import main
+from dembark.validation.runs import executor
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -104,6 +109,33 @@ def environment(tmp_path: Path) -> dict[str, str]:
     shutil.copy(Path(__file__).with_name("stand_in_analysis.py"), site / "sitecustomize.py")
     paths = [str(site), os.environ.get("PYTHONPATH", "")]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths)), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+
+
+@pytest.fixture
+def stand_in_analysis(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The stand-ins for measurement, comparison and report in this process."""
+    for name, function in import_module("stand_in_analysis").STAND_INS:
+        monkeypatch.setattr(import_module(f"dembark.validation.{name}"), function.__name__, function)
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Callable[..., Any]]:
+    """`command(*words, folder=tmp_path)`: the command `dembark` in this process and in the `folder`; its exit code, output and errors.
+    Steps after the runs are made in threads instead of processes."""
+    monkeypatch.setattr(executor, "ProcessPoolExecutor", lambda cores, *_: ThreadPoolExecutor(cores))
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def call(*words: str, folder: Path = tmp_path) -> tuple[int, str, str]:
+        monkeypatch.chdir(folder)
+        folders.load.cache_clear()
+        engines.find.cache_clear()
+        capsys.readouterr()
+        code = main(list(words))
+        return code, *capsys.readouterr()
+
+    yield call
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture

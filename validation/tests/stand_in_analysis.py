@@ -4,7 +4,6 @@ Copied as `sitecustomize.py` to a folder on PYTHONPATH it gives every Python pro
 """
 
 import json
-import os
 import sys
 import types
 
@@ -50,11 +49,9 @@ def write(folder):
     pass
 
 
-# Only some of them where a test needs the real measurement.
-wanted = os.environ.get("STAND_INS", "verification metrics judge.comparison report campaigns.report.build").split()
-for name, function in (("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study),
-                       ("judge.comparison", compare), ("report", build), ("campaigns.report.build", build)):
-    if name not in wanted:
-        continue
-    module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))
-    setattr(module, function.__name__, function)
+STAND_INS = [("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("judge.comparison", compare),
+             ("report", build), ("campaigns.report.build", build)]
+if __name__ == "sitecustomize":
+    for name, function in STAND_INS:
+        module = sys.modules.setdefault(f"dembark.validation.{name}", types.ModuleType(f"dembark.validation.{name}"))
+        setattr(module, function.__name__, function)

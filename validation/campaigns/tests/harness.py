@@ -13,20 +13,12 @@ _MODULE = importlib.util.module_from_spec(_SPEC)
 sys.modules[_SPEC.name] = _MODULE
 _SPEC.loader.exec_module(_MODULE)
 
-decks, stand_in, environment, wait_for, lives = (getattr(_MODULE, name)
-                                                 for name in ("decks", "stand_in", "environment", "wait_for", "lives"))
-engine_pid = _MODULE.engine_pid
+decks, stand_in, environment, stand_in_analysis, command = (
+    getattr(_MODULE, name) for name in ("decks", "stand_in", "environment", "stand_in_analysis", "command"))
+wait_for, lives, engine_pid = (getattr(_MODULE, name) for name in ("wait_for", "lives", "engine_pid"))
 
 
 def start(folder: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:
     """The command `dembark` in `folder`."""
     return subprocess.Popen([sys.executable, "-m", "dembark.validation.cli", *words], cwd=folder, env=environment,
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def dembark(folder: Path, environment: dict[str, str], *words: str) -> tuple[int, str, str]:
-    """The same, to its end: exit code, output and errors."""
-    process = start(folder, environment, *words)
-    out, error = process.communicate(timeout=300)
-    assert "Traceback" not in error, error
-    return process.returncode, out, error

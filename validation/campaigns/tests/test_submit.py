@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from harness import decks, dembark, engine_pid, environment, lives, stand_in, start, wait_for  # noqa: F401
+from harness import command, decks, engine_pid, environment, lives, stand_in, stand_in_analysis, start, wait_for  # noqa: F401
 
 from dembark.common.files import read_json
 from dembark.common.lock import lock
@@ -20,7 +20,9 @@ from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.cli import main
 from dembark.validation.runs.folder import look
 
-pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+Command = Callable[..., tuple[int, str, str]]
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in", "stand_in_analysis")
 
 CAMPAIGN = """
 [campaign]
@@ -76,9 +78,9 @@ def test_a_dry_run_says_what_it_will_cost_and_leaves_nothing(
     assert not (tmp_path / "results").exists()
 
 
-def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Path, environment: dict[str, str]) -> None:
+def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Path, command: Command) -> None:
     (tmp_path / "c.toml").write_text(CAMPAIGN)
-    code, out, error = dembark(tmp_path, environment, "submit", "c.toml")
+    code, out, error = command("submit", "c.toml")
     results = tmp_path / "results/campaigns/boxes"
     assert code == 1 and "4 of 5 runs finished" in out and "not finished: box dry_behaviour=exit liggghts 1: " in out, error + logs(results)
     attempts = {(run.variant, run.replica): (run.state, run.attempt) for run in tables.runs(results).itertuples()}
@@ -102,7 +104,7 @@ def test_faults_are_tried_again_and_a_changed_file_repeats_nothing(tmp_path: Pat
     (tmp_path / "c.toml").write_text(changed)
     for path in (results / "plan.json", results / "report.html", *results.glob("*/*/*/metrics.json")):
         path.unlink()
-    code, out, error = dembark(tmp_path, environment, "submit", "c.toml")
+    code, out, error = command("submit", "c.toml")
     assert code == 0 and error.count("already finished; reusing") == 4 and "6 of 6 runs finished" in out, error
     assert {path: path.stat().st_mtime_ns for path in made} == made
     assert list(tables.runs(results)["state"]) == ["finished"] * 6 and len(tables.quantities(results)) == 4
@@ -125,21 +127,23 @@ grain_diameter = ["4 mm", "5 mm"]
 
 
 @pytest.mark.parametrize("how", ["option", "relative variable"])
-def test_a_campaign_of_own_cases_goes_on_from_anywhere(tmp_path: Path, decks: Path, environment: dict[str, str], how: str) -> None:
+def test_a_campaign_of_own_cases_goes_on_from_anywhere(tmp_path: Path, decks: Path, command: Command,
+                                                       monkeypatch: pytest.MonkeyPatch, how: str) -> None:
     own, elsewhere = tmp_path / "own", tmp_path / "elsewhere"
     shutil.copytree(decks / "box", own / "crate")
     elsewhere.mkdir()
     (own / "crate" / "case.toml").write_text((own / "crate" / "case.toml").read_text().replace('name = "box"\n', ""))
     (tmp_path / "c.toml").write_text(OWN)
-    words = ["--cases", "own"] if how == "option" else []
-    first = environment | ({} if words else {"DEMBARK_CASES": "own"})
-    code, _, error = dembark(tmp_path, first, *words, "submit", "c.toml", "--out", "done")
+    monkeypatch.setenv("DEMBARK_CASES", "" if how == "option" else "own")
+    code, _, error = command(*(["--cases", "own"] if how == "option" else []), "submit", "c.toml", "--out", "done")
     assert code == 0, error
     shutil.rmtree(next((tmp_path / "done").glob("crate/*/liggghts/replica-1")))
-    code, out, error = dembark(elsewhere, environment, "resume", str(tmp_path / "done"))
+    monkeypatch.delenv("DEMBARK_CASES")
+    code, out, error = command("resume", str(tmp_path / "done"), folder=elsewhere)
     assert code == 0 and "2 of 2 runs finished" in out and error.count("already finished; reusing") == 1, error
     own.rename(tmp_path / "gone")
-    code, _, error = dembark(elsewhere, environment, "resume", str(tmp_path / "done"))
+    monkeypatch.delenv("DEMBARK_CASES", raising=False)
+    code, _, error = command("resume", str(tmp_path / "done"), folder=elsewhere)
     assert code == 2 and "own is gone" in error and error.count("\n") == 1
 
 
@@ -158,7 +162,7 @@ def test_a_folder_with_other_things_is_refused(tmp_path: Path, monkeypatch: pyte
 
 
 def test_a_campaign_goes_on_after_its_submitter_was_killed(
-        tmp_path: Path, environment: dict[str, str], wait_for: Callable[..., Any], engine_pid: Callable[[Path], int],
+        tmp_path: Path, environment: dict[str, str], command: Command, wait_for: Callable[..., Any], engine_pid: Callable[[Path], int],
         lives: Callable[[int], bool]) -> None:
     head, _, _ = CAMPAIGN.partition('[[sweeps]]\ncase = "box"\nvariant')
     text = head.replace('"kill", "exit", "ok"', '"hang", "ok"') + '[resources]\nrestart_interval = "0.0001 s"\n'
@@ -181,11 +185,11 @@ def test_a_campaign_goes_on_after_its_submitter_was_killed(
 
     # It hangs only in its first attempt: when it goes on from a restart file it comes to its end. Another campaign does not get in between.
     (tmp_path / "d.toml").write_text(text.replace('"boxes"', '"others"'))
-    code, out, error = dembark(tmp_path, environment, "resume", "o")
+    code, out, error = command("resume", "o")
     assert code == 0 and "2 of 2 runs finished" in out, error + logs(results)
     assert record.stat().st_mtime_ns == made
     assert list(tables.runs(results)["state"]) == ["finished"] * 2 and len(tables.quantities(results)) == 2
-    code, _, error = dembark(tmp_path, environment, "submit", "d.toml", "--out", "o")
+    code, _, error = command("submit", "d.toml", "--out", "o")
     assert code == 2 and "belongs to the campaign boxes" in error
 
 

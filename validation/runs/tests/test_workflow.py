@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from harness import decks, dembark, engine_pid, environment, lives, stand_in, start, wait_for  # noqa: F401
+from harness import command, decks, engine_pid, environment, lives, stand_in, stand_in_analysis, start, wait_for  # noqa: F401
 
 from dembark.common.files import read_json
 from dembark.validation.campaigns.plan import of_profile
@@ -16,7 +16,9 @@ from dembark.validation.case import folders
 from dembark.validation.results import states
 from dembark.validation.runs.steps import studies
 
-pytestmark = pytest.mark.usefixtures("decks", "stand_in")
+Command = Callable[..., tuple[int, str, str]]
+
+pytestmark = pytest.mark.usefixtures("decks", "stand_in", "stand_in_analysis")
 
 
 def reported(results: Path) -> list[str]:
@@ -30,8 +32,8 @@ def set_default(decks: Path, variant: str, line: str) -> None:
     path.write_text(f"{head}[variants.{variant}]\n{line}\n{tail}")
 
 
-def test_all_runs_then_none_again_then_only_what_changed(tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
-    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+def test_all_runs_then_none_again_then_only_what_changed(tmp_path: Path, command: Command, decks: Path) -> None:
+    code, out, error = command("validate", "--profile", "quick")
     results = tmp_path / "results" / "quick"
     assert code == 0, error
     assert "3 of 3 runs finished; 2 of 3 checks passed, 1 FAILED" in out and str(results / "report.html") in out
@@ -42,12 +44,12 @@ def test_all_runs_then_none_again_then_only_what_changed(tmp_path: Path, environ
     assert error.count("finished in") == 3 + 3 + 1 + 1  # runs, measurements, a comparison and the report
     made = {path: path.stat().st_mtime_ns for path in results.glob("*/*/*/replica-1/run.json")}
 
-    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    code, out, error = command("validate", "--profile", "quick")
     assert code == 0 and error.count("already finished; reusing") == 3 and "started" not in error
     assert {path: path.stat().st_mtime_ns for path in made} == made
 
     set_default(decks, "wet", "grain_count = 12")
-    code, out, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    code, out, error = command("validate", "--profile", "quick")
     assert code == 0 and error.count("already finished; reusing") == 2 and error.count("1: finished in") == 1
     assert sum(path.stat().st_mtime_ns != before for path, before in made.items()) == 1
     assert read_json(results / "box/wet/liggghts/metrics.json")["parameters"]["grain_count"] == 12
@@ -82,30 +84,30 @@ def test_a_line_of_runs_may_give_an_engine_its_own_number_of_replicas(decks: Pat
     assert {one.runs[0].engine.name: len(one.runs) for one in of_profile("standard")} == {"liggghts": 3, "yade": 1}
 
 
-def test_a_study_is_inputs_hash_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, environment: dict[str, str],
+def test_a_study_is_inputs_hash_its_variants_and_again_when_one_of_them_changes(tmp_path: Path, command: Command,
                                                                             decks: Path) -> None:
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace("[runs]\n", STUDY).replace(
         '{variant = "dry"}, {variant = "wet", engines = ["liggghts"]}',
         '{variant = "dry", engines = ["liggghts"]}, {variant = "large", engines = ["liggghts"]}, '
         '{variant = "huge", engines = ["liggghts"]}'))
-    code, _, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    code, _, error = command("validate", "--profile", "quick")
     results = tmp_path / "results" / "quick"
     assert code == 0, error
     assert read_json(results / "box/study-size/liggghts/metrics.json")["parameters"]["numbers"] == [10, 30, 40]
     assert "box/study-size/liggghts/metrics.json" in (results / "report.html").read_text()
 
     path.write_text(path.read_text().replace("grain_count = 40", "grain_count = 50"))
-    code, _, error = dembark(tmp_path, environment, "validate", "--profile", "quick")
+    code, _, error = command("validate", "--profile", "quick")
     assert code == 0 and read_json(results / "box/study-size/liggghts/metrics.json")["parameters"]["numbers"] == [10, 30, 50]
 
 
 def test_a_failed_run_is_missing_in_the_report_and_nothing_stale_takes_its_place(
-        tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
-    assert dembark(tmp_path, environment, "validate")[0] == 0
+        tmp_path: Path, command: Command, decks: Path) -> None:
+    assert command("validate")[0] == 0
     results = tmp_path / "results" / "quick"
     set_default(decks, "wet", 'behaviour = "kill"')
-    code, out, error = dembark(tmp_path, environment, "validate")
+    code, out, error = command("validate")
     assert code == 1
     assert "2 of 3 runs finished" in out and "not finished: box wet liggghts 1: " in out and "SIGKILL" in out
     assert "dembark: the validation is incomplete" in error
@@ -117,28 +119,28 @@ def test_a_failed_run_is_missing_in_the_report_and_nothing_stale_takes_its_place
     assert (results / "box/wet/liggghts/superseded/replica-1/run.json").is_file()
 
 
-def test_replicas_that_are_no_longer_wanted_do_not_count(tmp_path: Path, environment: dict[str, str], decks: Path) -> None:
+def test_replicas_that_are_no_longer_wanted_do_not_count(tmp_path: Path, command: Command, decks: Path) -> None:
     words = ("validate", "--profile", "standard", "--engine", "liggghts")
-    assert dembark(tmp_path, environment, *words)[0] == 0
+    assert command(*words)[0] == 0
     metrics = tmp_path / "results/standard/box/dry/liggghts/metrics.json"
     assert read_json(metrics)["quantities"][0]["value"] == 3
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace("replicas = 3", "replicas = 2"))
-    assert dembark(tmp_path, environment, *words)[0] == 0
+    assert command(*words)[0] == 0
     assert read_json(metrics)["quantities"][0]["value"] == 2
 
 
-def test_a_measurement_that_fails_is_told(tmp_path: Path, environment: dict[str, str]) -> None:
+def test_a_measurement_that_fails_is_told(tmp_path: Path, command: Command) -> None:
     folder = tmp_path / "results/quick/box/wet/liggghts"
     folder.mkdir(parents=True)
     (folder / "unmeasurable").touch()
-    code, out, _ = dembark(tmp_path, environment, "validate")
+    code, out, _ = command("validate")
     assert code == 1 and "problem: " in out and "ValueError: cannot be measured" in out and "report.html" in out
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.full), signal.SIGKILL])
 def test_an_interrupted_workflow_goes_on_where_it_was(
-        tmp_path: Path, environment: dict[str, str], decks: Path, number: int, wait_for: Callable[..., object],
+        tmp_path: Path, environment: dict[str, str], command: Command, decks: Path, number: int, wait_for: Callable[..., object],
         engine_pid: Callable[[Path], int], lives: Callable[[int], bool]) -> None:
     set_default(decks, "wet", 'behaviour = "hang"')
     process = start(tmp_path, environment, "validate", "--cores", "3")
@@ -155,17 +157,17 @@ def test_an_interrupted_workflow_goes_on_where_it_was(
     time.sleep(0.5)
     path = decks / "box" / "case.toml"
     path.write_text(path.read_text().replace('behaviour = "hang"\n', ""))
-    code, _, error = dembark(tmp_path, environment, "validate")
+    code, _, error = command("validate")
     assert code == 0 and error.count("already finished; reusing") == 2 and error.count("1: finished in") == 1
     assert not list(results.glob("**/.replica-1.part-*"))
 
 
 def test_two_validations_of_one_profile_do_not_mix(
-        tmp_path: Path, environment: dict[str, str], decks: Path, engine_pid: Callable[[Path], int]) -> None:
+        tmp_path: Path, environment: dict[str, str], command: Command, decks: Path, engine_pid: Callable[[Path], int]) -> None:
     set_default(decks, "wet", 'behaviour = "hang"')
     first = start(tmp_path, environment, "validate")
     engine_pid(tmp_path / "results/quick/box/wet")
-    code, _, error = dembark(tmp_path, environment, "validate")
+    code, _, error = command("validate")
     assert code == 2 and "another validation" in error
     first.terminate()
     first.communicate(timeout=60)
