@@ -47,6 +47,7 @@ def test_goals_are_ratios_of_medians():
                      "network, warm, 1000: dembark auto, s": (5e-4, True)}
 
 
+@pytest.mark.full
 def test_small_measurement(tmp_path):
     assert measure(tmp_path, 1, wall=False, quick=True) == []
     text = (tmp_path / "lcp.md").read_text(encoding="utf-8")

@@ -58,6 +58,21 @@ class Deck:
                                      "time_step": self.setup.time_step, "impact_id_offset": facts.impact_id_offset})
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """YADE, which starts in seconds, is left to --full where a test runs the same in another engine by default."""
+    def alone(item: pytest.Function) -> tuple[object, ...]:
+        """The test and its parameters but for the engine."""
+        return item.path, item.originalname, *((key, repr(one)) for key, one in item.callspec.params.items() if key != "engine")
+
+    runs = [one for one in items if one.path.parent == Path(__file__).parent and isinstance(one, pytest.Function)
+            and "engine" in getattr(getattr(one, "callspec", None), "params", ()) and {"decks", "simulate"} & set(one.fixturenames)]
+    others = {alone(one) for one in runs if one.callspec.params["engine"] != "yade" and "full" not in one.keywords}
+    for one in runs:
+        if one.callspec.params["engine"] == "yade" and alone(one) in others:
+            one.add_marker(pytest.mark.full)
+
+
 @pytest.fixture(scope="session")
 def decks() -> type[Deck]:
     return Deck

@@ -92,6 +92,7 @@ def test_radius_given_decides_how_many_logs(engine: str, finished: Any) -> None:
     assert len(GrainsDump(finished(engine, **given) / "grains.dump")[0].ids) == 15
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("engine", ENGINES)
 def test_killed_run_goes_on_to_the_same_end(engine: str, tmp_path: Path) -> None:
     try:

@@ -105,10 +105,10 @@ def both(prepared: Any) -> Callable[..., tuple[Run, Run, int]]:
     return make
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("case", "values"), [
-    ("plug_flow", PLUG | {"grain_count": 120}), pytest.param("column_collapse", COLUMN, marks=pytest.mark.full), pytest.param(
-        "plane_silo", {"grain_count": 120, "silo_width": 0.03, "slab_depth": 0.024, "settle_time": 0.1, "measure_time": 0.05, "frames": 3},
-        marks=pytest.mark.full)])
+    ("plug_flow", PLUG | {"grain_count": 120}), ("column_collapse", COLUMN),
+    ("plane_silo", {"grain_count": 120, "silo_width": 0.03, "slab_depth": 0.024, "settle_time": 0.1, "measure_time": 0.05, "frames": 3})])
 def test_no_grain_falls_through_the_base_after_a_restart(case: str, values: dict[str, Any], prepared: Any) -> None:
     """Pairs that nearly touch are found anew whenever YADE goes on from a state, also those with a base that is larger than the period."""
     run = prepared(case, "yade", values | {"restart_every": 80})
@@ -143,11 +143,14 @@ def test_killed_run_goes_on_to_the_same_bytes(case: str, engine: str, ranks: int
 
 
 @pytest.mark.parametrize(("case", "variant", "values", "engine"), [
-    *(("single_contact", "test_8_b", {"points": 3, "time_step": 1e-5, "restart_every": 70}, engine) for engine in ALL),
-    *(("liquid_exchange", None, {"duration": 0.2, "rows": 200, "restart_every": 700}, engine) for engine in ALL[:2]),
-    # While the force on the cylinder still grows.
-    *(("water_tank", "cylinder", {"across": 8, "run_time": 0.45, "restart_every": 300}, engine) for engine in ALL[:2]),
-    *(("water_tank", "drifting", {"across": 8, "restart_every": 60}, engine) for engine in ALL[:2])])
+    pytest.param(*one, engine, marks=pytest.mark.full if engine == "yade" else ())
+    for *one, engines_of_it in (
+        ("single_contact", "test_8_b", {"points": 3, "time_step": 1e-5, "restart_every": 70}, ALL),
+        ("liquid_exchange", None, {"duration": 0.2, "rows": 200, "restart_every": 700}, ALL[:2]),
+        # While the force on the cylinder still grows.
+        ("water_tank", "cylinder", {"across": 8, "run_time": 0.45, "restart_every": 300}, ALL[:2]),
+        ("water_tank", "drifting", {"across": 8, "restart_every": 60}, ALL[:2]))
+    for engine in engines_of_it])
 def test_finished_run_is_resumed_from_its_last_state_to_the_same_files(case: str, variant: str | None, values: dict[str, Any], engine: str,
                                                                       decks: Any, tmp_path: Path) -> None:
     given = {key: value for key, value in values.items() if key != "restart_every"}
@@ -160,7 +163,8 @@ def test_finished_run_is_resumed_from_its_last_state_to_the_same_files(case: str
 
 @pytest.mark.parametrize("engine", ALL)
 @pytest.mark.parametrize(("case", "values"), [
-    ("silo", SILO), ("debarking_drum", {"log_count": 10, "filling": 0.2, "run_in": 0, "revolutions": 1, "restart_every": 700})])
+    ("silo", SILO), pytest.param("debarking_drum", {"log_count": 10, "filling": 0.2, "run_in": 0, "revolutions": 1, "restart_every": 700},
+                                 marks=pytest.mark.full)])
 def test_resuming_without_a_state_says_so(case: str, values: dict[str, Any], engine: str, prepared: Any) -> None:
     deck = prepared(case, engine, values).deck
     assert deck.start(resume="yes").wait(60) != 0
@@ -168,7 +172,7 @@ def test_resuming_without_a_state_says_so(case: str, values: dict[str, Any], eng
     assert "there is no whole state" in said and "Traceback" not in said
 
 
-@pytest.mark.parametrize("engine", ["liggghts", "yade"])
+@pytest.mark.parametrize("engine", ["liggghts", pytest.param("yade", marks=pytest.mark.full)])
 def test_run_begun_anew_leaves_the_states_of_another(engine: str, prepared: Any) -> None:
     values = PILE | {"duration": 0.1, "restart_every": 500}
     prepared("log_pile", engine, values).go()
@@ -202,7 +206,9 @@ def planned(engine: str) -> plan.Run:
         pytest.skip(str(error))
 
 
-@pytest.mark.parametrize(("engine", "number"), [("liggghts", signal.SIGTERM), ("yade", signal.SIGKILL), ("lammps", signal.SIGKILL)])
+@pytest.mark.parametrize(("engine", "number"), [
+    pytest.param("liggghts", signal.SIGTERM, marks=pytest.mark.full), pytest.param("yade", signal.SIGKILL, marks=pytest.mark.full),
+    ("lammps", signal.SIGKILL)])
 def test_harness_resumes_what_was_ended_from_outside(engine: str, number: int, tmp_path: Path) -> None:
     one = planned(engine)
     used = Resources(restart_interval={"liggghts": 0.05, "yade": 0.5, "lammps": 0.05}[engine])

@@ -151,7 +151,7 @@ SHORT: dict[str, dict[str, float]] = {"still": {"across": 10, "run_time": 0.6}, 
                                       "drifting": {"across": 8}}
 
 
-@pytest.mark.parametrize("scene", SHORT)
+@pytest.mark.parametrize("scene", [pytest.param(one, marks=pytest.mark.full if one == "falling" else ()) for one in SHORT])
 def test_both_engines_have_the_same_flow(scene: str, simulate: Any) -> None:
     found = {}
     for engine in ("liggghts", "yade"):

@@ -133,6 +133,7 @@ def _nodes(tree: ast.AST) -> Iterator[ast.AST]:
         yield from _nodes(node)
 
 
+@cache
 def _neighbour(path: Path, name: str) -> Path | None:
     """File of the module that the file `path` calls `name`, with points in front; the folder of a case needs no __init__.py for it."""
     parts = name.lstrip(".").split(".")

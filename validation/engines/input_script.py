@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 import jinja2
@@ -13,17 +14,21 @@ from dembark.common.choices import Value
 from .base import DECK_NOTE, DeckNumber, Engine, end_with_parent, texts
 
 
+@cache
+def _environment(folders: tuple[str, ...]) -> jinja2.Environment:
+    """That of the templates in `folders`, each of which is compiled once until its file changes."""
+    return jinja2.Environment(loader=jinja2.FileSystemLoader(folders), undefined=jinja2.StrictUndefined, variable_start_string="<<",
+                              variable_end_string=">>", comment_start_string="{*", comment_end_string="*}", trim_blocks=True,
+                              lstrip_blocks=True, keep_trailing_newline=True, autoescape=False)
+
+
 class InputScript(Engine):
     """An engine whose deck is a list of commands, with `-var key value` on its command line; MPI ranks, no threads."""
 
     @classmethod
     def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
         """See Engine. The source is a Jinja template with << >> around expressions, for ${ } and { } have a meaning in decks."""
-        environment = jinja2.Environment(loader=jinja2.FileSystemLoader([str(folder) for folder in folders]),
-                                         undefined=jinja2.StrictUndefined,
-                                         variable_start_string="<<", variable_end_string=">>",
-                                         comment_start_string="{*", comment_end_string="*}", trim_blocks=True, lstrip_blocks=True,
-                                         keep_trailing_newline=True, autoescape=False)
+        environment = _environment(tuple(map(str, folders)))
         # Tables are for the template; a variable holds one number.
         given = texts({name: number.value for name, number in numbers.items() if not isinstance(number.value, tuple)})
         width = max((len(name) for name in given), default=0)

@@ -1,13 +1,9 @@
-"""Grains of a picture have the pressure that their contacts give them, and are drawn without a display."""
-
-import io
+"""Grains of a picture have the pressure that their contacts give them."""
 
 import numpy as np
-from PIL import Image
 
-from dembark.postproc import render
 from dembark.postproc.fields.coarse_graining import WallContacts
-from dembark.postproc.pictures import packings, saved
+from dembark.postproc.pictures import packings
 from dembark.validation.verification import scenes
 
 
@@ -21,11 +17,3 @@ def test_pressure_in_a_grain_between_two_others():
     np.testing.assert_allclose(packings.grain_pressure(frame, links), [0.5 * middle, middle, 0.5 * middle])
     wall = WallContacts(np.array([[-0.5, 0.0, 0.0]]), place[:1], np.array([[6.0, 0.0, 0.0]]))
     np.testing.assert_allclose(packings.grain_pressure(frame, links, [wall]), [middle, middle, 0.5 * middle])
-
-
-def test_picture_is_drawn_without_a_display(monkeypatch):
-    monkeypatch.delenv("DISPLAY", raising=False)
-    random = np.random.default_rng(1)
-    scene = render.Scene(random.uniform(0, 1, (50, 3)), np.full(50, 0.1), random.uniform(0, 1, 50), "v")
-    image = np.asarray(Image.open(io.BytesIO(saved(render.picture(scene)))).convert("L"))
-    assert image.min() < 100 and image.max() > 250

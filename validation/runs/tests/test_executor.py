@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -94,7 +95,8 @@ def test_what_was_killed_is_started_again_and_what_failed_is_not(tmp_path: Path,
     assert list(made.errors) == [two, three] and stored_hash(tmp_path / "m.json")
 
 
-def test_steps_are_made_again_when_what_they_read_has_changed(tmp_path: Path) -> None:
+def test_steps_are_made_again_when_what_they_read_has_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(executor_module, "ProcessPoolExecutor", lambda cores, *_: ThreadPoolExecutor(cores))
     source = tmp_path / "source"
     source.write_text("1")
     first, second = step("a", tmp_path, [], sources=[source]), step("b", tmp_path, ["a"], sources=[tmp_path / "a.json"])
@@ -121,12 +123,23 @@ def test_a_step_that_fails_or_is_killed_stops_no_other(tmp_path: Path) -> None:
     assert [str(error) for error in made.errors.values()] == ["no number"]
 
 
+def begin(path: Path) -> None:
+    path.touch()
+    time.sleep(600)
+
+
 def test_an_interruption_ends_steps_at_once(tmp_path: Path) -> None:
-    cancel = threading.Event()
-    threading.Timer(3.0, cancel.set).start()
+    cancel, path = threading.Event(), tmp_path / "begun"
+
+    def interrupt() -> None:
+        while not path.exists():
+            time.sleep(0.02)
+        cancel.set()
+
+    threading.Thread(target=interrupt, daemon=True).start()
     began = time.monotonic()
     with pytest.raises(Interrupted):
-        execute([], [step("long", tmp_path, [], time.sleep, 600)], cancel)
+        execute([], [step("long", tmp_path, [], begin, path)], cancel)
     assert time.monotonic() - began < 60 and execute.last["long"].state == "stopped"  # type: ignore[attr-defined]
 
 

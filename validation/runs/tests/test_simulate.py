@@ -177,7 +177,7 @@ def command(tmp_path: Path) -> Iterator[Command]:
     process.communicate()
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGTERM, marks=pytest.mark.full), signal.SIGINT])
 def test_a_signal_to_the_command_ends_the_engine(command: Command, number: int, engine_pid: FindPid, lives: Lives) -> None:
     process, out = command
     pid = engine_pid(out)
@@ -187,23 +187,18 @@ def test_a_signal_to_the_command_ends_the_engine(command: Command, number: int, 
     assert not lives(pid) and not list(out.glob(".*work*"))
 
 
-def test_a_killed_command_leaves_no_engine_and_the_next_start_clears_up(
+def test_a_run_belongs_to_one_process_and_when_that_is_killed_the_next_clears_up(
         command: Command, engine_pid: FindPid, lives: Lives, wait_for: Callable[..., object]) -> None:
     process, out = command
     pid = engine_pid(out)
+    with pytest.raises(DembarkError, match="by another process"):
+        run(out)
     process.kill()
     process.wait()
     wait_for(lambda: not lives(pid))
     assert list(out.glob(".replica-1.work-*"))
     assert run(out)[1] == "finished"
     assert not list(out.glob(".replica-1.work-*"))
-
-
-def test_two_processes_do_not_compute_the_same_run(command: Command, engine_pid: FindPid) -> None:
-    _, out = command
-    engine_pid(out)
-    with pytest.raises(DembarkError, match="by another process"):
-        run(out)
 
 
 def test_too_little_room_is_told_before_the_start(tmp_path: Path) -> None:
