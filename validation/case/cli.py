@@ -66,8 +66,11 @@ def _empty(folder: Path) -> None:
 def new_case(
     name: Annotated[str, typer.Argument(help="Name of the case: lower-case letters, digits and underscores.")],
     folder: Annotated[Path, typer.Option("--in", help="Folder of your cases; the case gets a folder of its name in it.")] = Path(),
+    template: Annotated[str, typer.Option(help="sphere: one sphere bounces, no set-up in Python. packing: many grains settle.")] = "sphere",
 ) -> None:
     """Write a template of a case that runs."""
+    templates = {path.name: path for path in (package_root() / "common" / "template").iterdir() if path.is_dir()}
+    pick(template, templates, "template", "in --template")
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise DembarkError(f"{name!r} is not a name of a case", "", "take lower-case letters, digits and underscores, a letter first")
     if (shipped_root() / name).exists():
@@ -76,7 +79,7 @@ def new_case(
     _empty(target)
     try:
         target.mkdir(parents=True, exist_ok=True)
-        for path in sorted((package_root() / "common" / "template").iterdir()):
+        for path in sorted(path for path in templates[template].iterdir() if path.is_file()):
             (target / path.name).write_text(path.read_text(encoding="utf-8").replace("NAME", name), encoding="utf-8")
     except OSError as error:
         raise DembarkError(f"cannot write to {target}", error.strerror or str(error)) from None
