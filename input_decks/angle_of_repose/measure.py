@@ -36,7 +36,7 @@ def wall_factor(confinement: float) -> float:
 
 def code(confinement: float | None = None) -> list[tuple[float, float, float]]:
     """What the other code found: (d/w, coefficient of rolling resistance, angle in degrees), rising; at one d/w if given."""
-    rows = [(float(row["confinement"]), float(row["rolling_friction"]), float(row["angle"])) for row in reference_rows(CODE)]
+    rows = [(row.number("confinement"), row.number("rolling_friction"), row.number("angle")) for row in reference_rows(CODE)]
     return sorted(row for row in rows if confinement in (None, row[0]))
 
 

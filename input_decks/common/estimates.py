@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from dembark.common.choices import nearest
+from dembark.common.errors import DembarkError
 from dembark.postproc.measurement import Array, Estimate, over_replicas
 from dembark.postproc.statistics import combined
 
@@ -34,7 +36,30 @@ def values_and_halves(found: Sequence[Estimate]) -> tuple[Array, Array]:
     return np.array([one.value for one in found]), np.array([one.half for one in found])
 
 
-def reference_rows(path: Path, **wanted: str) -> list[dict[str, str]]:
-    """Rows of a CSV file of reference data whose columns have the `wanted` texts."""
-    with path.open(encoding="utf-8") as file:
-        return [row for row in csv.DictReader(file) if all(row[name] == text for name, text in wanted.items())]
+class Row(dict[str, str]):
+    """A row of a table: the texts of the columns by name; `where` is its file and line."""
+
+    def __init__(self, texts: Mapping[str, str], where: str) -> None:
+        """Keep `texts` and `where`."""
+        super().__init__(texts)
+        self.where = where
+
+    def number(self, column: str, empty: float | None = None) -> float:
+        """The number in `column`; `empty`, if given, where the field is empty. DembarkError with file and line when there is none."""
+        text = self.get(column) or ""
+        if not text.strip() and empty is not None and column in self:
+            return empty
+        try:
+            return float(text)
+        except ValueError:
+            what = f"{column} = {text!r} is not a number" if column in self else f"there is no column {column!r}"
+            raise DembarkError(self.where, what, "write the decimal point" if "," in text else nearest(column, self)
+                               if column not in self else "") from None
+
+
+def reference_rows(path: Path, **wanted: str) -> list[Row]:
+    """Rows of a CSV file of reference data, with a header, whose columns have the `wanted` texts."""
+    with path.open(encoding="utf-8", newline="") as file:
+        reader = csv.DictReader(file)
+        rows = [Row(row, f"{path}, line {reader.line_num}") for row in reader]
+    return [row for row in rows if all(row[name] == text for name, text in wanted.items())]

@@ -27,7 +27,7 @@ NOWHERE = Estimate(math.nan, math.inf, "the front does not get so far")
 
 def published(source: str) -> tuple[Array, Array]:
     """Times T and fronts, over a."""
-    times, fronts = np.array([(float(row["time"]), float(row["front"])) for row in reference_rows(MEASURED, source=source)]).T
+    times, fronts = np.array([(row.number("time"), row.number("front")) for row in reference_rows(MEASURED, source=source)]).T
     return times, fronts
 
 

@@ -32,7 +32,7 @@ JUDGED = ("three", "six")
 
 def published(cubes: str, axis: str) -> tuple[Array, Array]:
     """Times (s) and places (m) of the top cube; empty where there are none."""
-    rows = [(float(row["time"]), float(row["place"])) for row in reference_rows(MEASURED, cubes=cubes, axis=axis)]
+    rows = [(row.number("time"), row.number("place")) for row in reference_rows(MEASURED, cubes=cubes, axis=axis)]
     times, places = np.array(rows).reshape(-1, 2).T
     return times, places
 

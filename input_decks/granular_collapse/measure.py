@@ -23,7 +23,7 @@ TITLES = {"run_out": "Run-out", "final_height": "Height at the back wall"}
 
 def points(quantity: str, low: float = 0.0, high: float = math.inf) -> list[tuple[float, float]]:
     """Measured (a, value) with `low` <= a <= `high`, rising in a."""
-    rows = [(float(row["a"]), float(row["value"])) for row in reference_rows(MEASURED, quantity=quantity)]
+    rows = [(row.number("a"), row.number("value")) for row in reference_rows(MEASURED, quantity=quantity)]
     return sorted(row for row in rows if low <= row[0] <= high)
 
 

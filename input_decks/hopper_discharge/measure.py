@@ -66,7 +66,7 @@ def published() -> dict[str, tuple[Array, Array]]:
     """Times (s) and shares of the digitisations of the published curve, by name."""
     points: dict[str, list[tuple[float, float]]] = {}
     for row in reference_rows(PUBLISHED):
-        points.setdefault(row["digitisation"], []).append((float(row["time"]), float(row["share"])))
+        points.setdefault(row["digitisation"], []).append((row.number("time"), row.number("share")))
     return {name: (one[:, 0], one[:, 1]) for name, table in points.items() for one in [np.array(table)]}
 
 

@@ -69,7 +69,7 @@ def misclosure(rows: Sequence[Mapping[str, Any]]) -> Array:
 def measured() -> list[Datum]:
     """The measured points. U_D of e_t and spin comes from their misclosure, a velocity: its mean is a common part of both; its scatter is
     shared, half of the variance in each. U_D of the angles is that of the file, common to all."""
-    rows = [{key: text if key == "quantity" else float(text or 0.0) for key, text in row.items()} for row in reference_rows(MEASURED)]
+    rows = [{key: text if key == "quantity" else row.number(key, 0.0) for key, text in row.items()} for row in reference_rows(MEASURED)]
     open_by = misclosure(rows)
     common, scatter = abs(float(open_by.mean())), student(len(open_by) - 1) * float(open_by.std(ddof=1)) / math.sqrt(2.0)
 

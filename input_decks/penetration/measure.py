@@ -18,7 +18,7 @@ def published() -> dict[str, list[float]]:
     """Means over the packings of each code that counts (see reference/README.md), by quantity."""
     found: dict[str, list[float]] = {}
     for row in reference_rows(REFERENCE / "dosta_2024.csv", counted="1"):
-        found.setdefault(row["quantity"], []).append(float(row["mean"]))
+        found.setdefault(row["quantity"], []).append(row.number("mean"))
     return found
 
 

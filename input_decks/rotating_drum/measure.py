@@ -28,7 +28,7 @@ ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, 
 
 def tracked_profile() -> tuple[Array, Array]:
     """n (m), ascending, and speed (m/s) of the tracked points, without one that is out of line by 0.05 m/s."""
-    rows = np.array(sorted((float(row["y"]), float(row["u"])) for row in reference_rows(HERE / "alizadeh_2013.csv", used="1")))
+    rows = np.array(sorted((row.number("y"), row.number("u")) for row in reference_rows(HERE / "alizadeh_2013.csv", used="1")))
     return rows[:, 0], rows[:, 1]
 
 
@@ -71,7 +71,7 @@ def missing_balance() -> str:
 
 def other_code() -> dict[str, dict[str, float]]:
     """Rows of the table of Sunday et al. by variant: angle, its limit, depth of the layer; NaN where it has none."""
-    return {row["variant"]: {key: float(row[key] or "nan") for key in ("angle", "angle_limit", "layer", "centrifuging")}
+    return {row["variant"]: {key: row.number(key, math.nan) for key in ("angle", "angle_limit", "layer", "centrifuging")}
             for row in reference_rows(HERE / "sunday_2020.csv")}
 
 

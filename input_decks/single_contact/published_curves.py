@@ -29,7 +29,7 @@ def with_published(found: Measurement, path: Path, variant: str, labels: Mapping
     for (method, quantity, material), group in groupby(rows, lambda row: (row["method"], row["quantity"], row["material"])):
         points = list(group)
         one, name = own[f"{quantity}_{material}"], f"{method}_{quantity}"
-        x, y, x_half, y_half = np.array([[float(row[key]) for key in ("x", "y", "x_uncertainty", "y_uncertainty")] for row in points]).T
+        x, y, x_half, y_half = np.array([[row.number(key) for key in ("x", "y", "x_uncertainty", "y_uncertainty")] for row in points]).T
         place, first = np.unique(one["place"], return_index=True)
         smooth, inside = PchipInterpolator(place, np.array(one["value"])[first]), (place[0] <= x) & (x <= place[-1])
         judged = np.array([not row.get("left_out") for row in points])[inside]

@@ -61,7 +61,7 @@ def floating(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
 def falling(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
     """The time between two places below the level, in the run and the experiment."""
     rows, depth = run.times(), run.derived["depth"]
-    times, heights = np.array([(float(row["time"]), float(row["height"])) for row in reference_rows(REFERENCE)]).T
+    times, heights = np.array([(row.number("time"), row.number("height")) for row in reference_rows(REFERENCE)]).T
     below = heights - LEVEL
 
     def between(t: Array, y: Array) -> float:

@@ -115,10 +115,15 @@ def require_steps(case: Case, values: Mapping[str, Value]) -> None:
 
 
 def require_measure(case: Case) -> None:
-    """DembarkError when `case` has no measure.py: its runs could not be measured. Nothing is imported."""
-    if not (case.folder / "measure.py").is_file():
+    """DembarkError when `case` has no measure.py, or that names a table that is not there: its runs could not be measured. Nothing is
+    imported."""
+    code = case.folder / "measure.py"
+    if not code.is_file():
         raise DembarkError(f"case {case.name} has no measure.py", str(case.folder),
                            "add one with measure(replicas), see docs/how-to/cases.md")
+    for path, line, name in imports.absent_tables(code):
+        raise DembarkError(f"case {case.name} has no file {name}, or it is empty", f"{path}, line {line}, names it",
+                           f"put it into {case.folder / 'reference'}")
 
 
 def require_capable(case: Case, engine: str, values: Mapping[str, Value]) -> None:

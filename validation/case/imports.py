@@ -19,14 +19,17 @@ import dembark
 
 _PACKAGE = "dembark"
 _COMPILED = (".so", ".pyd")
+_TABLES = (".csv", ".dat", ".json", ".toml", ".txt")
 
 
 @dataclass(frozen=True)
 class _Names:
-    """What the source of a module names: `modules`, `a.b.c` or relative `.b.c`, that it may import, other `words` of its text constants."""
+    """What the source of a module names: `modules`, `a.b.c` or relative `.b.c`, that it may import, other `words` of its text constants,
+    and `data`: names of tables, with their lines, that are joined to a path made of `__file__`."""
 
     modules: frozenset[str]
     words: frozenset[str]
+    data: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,40 @@ def names(path: Path, word: str) -> bool:
     return any(one == word or one.startswith(f"{word}/") for one in _named(path).words)
 
 
+def absent_tables(code: Path) -> list[tuple[Path, int, str]]:
+    """Tables that the Python file `code` of a case, or a module of that case that it imports, names by a path made of `__file__`, and that
+    lie neither next to it nor in the folder `reference` nor where that path ends: file, line, name. Empty files are absent, too."""
+    own = [path for path in dependencies(code).files.values() if path.suffix == ".py" and path.is_relative_to(code.parent)]
+    return [(path, line, name) for path in own for name, line in _named(path).data
+            if not any(_has_content(folder / name) for folder in (path.parent, code.parent, code.parent / "reference"))]
+
+
+def _has_content(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size > 0
+
+
+def _data(tree: ast.Module) -> Iterator[tuple[str, int]]:
+    """Names of tables in `place / "name"`, `place.with_name("name")` and `place.joinpath("name")`, where `place` has `__file__` or a name
+    that the module gives to such a path; and their lines."""
+    anchors = {"__file__"}
+
+    def anchored(node: ast.AST) -> bool:
+        return any(isinstance(one, ast.Name) and one.id in anchors for one in ast.walk(node))
+
+    for statement in tree.body:
+        if isinstance(statement, ast.Assign) and anchored(statement.value):
+            anchors |= {one.id for one in statement.targets if isinstance(one, ast.Name)}
+    for node in _nodes(tree):
+        match node:
+            case ast.BinOp(left=place, op=ast.Div(), right=ast.Constant(value=str(name))):
+                names = [name]
+            case ast.Call(func=ast.Attribute(value=place, attr="with_name" | "joinpath"), args=given):
+                names = [one.value for one in given[-1:] if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+            case _:
+                continue
+        yield from ((name, node.lineno) for name in names if name.endswith(_TABLES) and anchored(place))
+
+
 def _named(path: Path) -> _Names:
     return _read(path, *_state(path))
 
@@ -120,7 +157,7 @@ def _read(path: Path, *_state: int) -> _Names:
                 modules.add(word)  # for import_module
             case ast.Constant(value=str(word)):
                 words.add(word)
-    return _Names(frozenset(modules), frozenset(words))
+    return _Names(frozenset(modules), frozenset(words), tuple(dict.fromkeys(_data(tree))))
 
 
 def _nodes(tree: ast.AST) -> Iterator[ast.AST]:

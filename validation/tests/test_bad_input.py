@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from dembark.common.errors import DembarkError
 from dembark.validation import engines
-from dembark.validation.case import folders
+from dembark.validation.case import deck, folders
 from dembark.validation.cli import main
 
 HEAD = '[campaign]\nname = "mine"\nprofile = "quick"\n[[sweeps]]\ncase = "silo"\n'
@@ -138,6 +139,24 @@ def test_missing_or_broken_checks_are_told_before_a_run(text: str | None, expect
         file.write_text(text)
     refused(("run", "box", "--engine", "liggghts", "--out", "out"), expected, capsys)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("place", ['Path(__file__).with_name("reference") / "film.csv"', 'HERE / "reference/film.csv"', 'HERE.joinpath("film.csv")'])
+@pytest.mark.parametrize("content", [None, "", "time\n0\n"], ids=["missing", "empty", "there"])
+def test_a_table_that_is_not_there_is_reported_before_a_run(place: str, content: str | None, decks: Path) -> None:
+    (decks / "box/measure.py").write_text("from . import curves\n")
+    module, table = decks / "box/curves.py", decks / "box/reference/film.csv"
+    module.write_text(f"HERE = Path(__file__).parent\nOUTPUT = run.folder / 'own.csv'\nFILM = {place}\n")
+    table.parent.mkdir()
+    if content is not None:
+        table.write_text(content)
+    box = folders.find("box")
+    if content:
+        deck.require_measure(box)
+        return
+    with pytest.raises(DembarkError) as caught:
+        deck.require_measure(box)
+    assert all(word in str(caught.value) for word in ("case box", "film.csv", f"{module}, line 3"))
 
 
 def test_own_decks_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
