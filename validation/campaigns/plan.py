@@ -14,7 +14,7 @@ from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
 from dembark.validation import engines, results
 from dembark.validation.case.deck import require_capable, require_measure, require_steps, sources
-from dembark.validation.case.folders import discover
+from dembark.validation.case.folders import discover, require_known
 from dembark.validation.case.model import Case
 from dembark.validation.case.resolve import for_replica, portable, resolve
 from dembark.validation.engines import Engine
@@ -148,7 +148,7 @@ def of_profile(profile: str, only_cases: Sequence[str] = (), only_engines: Seque
     ones only those that are named in `only_engines`."""
     cases = discover()
     for name in only_cases:
-        pick(name, cases, "case", "in --case")
+        require_known(name, cases, "in --case")
     for name in only_engines:
         pick(name, engines.names(), "engine", "in --engine")
     pick(profile, {name for case in cases.values() for name in case.profiles}, "profile", "in the cases")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
-from dembark.common.choices import pick
+from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
 
 from .model import Case
@@ -76,8 +76,18 @@ def discover() -> dict[str, Case]:
 def find(name: str) -> Case:
     """The case called `name`; only its own file is read, so a mistake in another case does not matter."""
     known = {path.parent.name: path for path in files()}
-    pick(name, known, "case", "")
+    require_known(name, known)
     return load(known[name])
+
+
+def require_known(name: str, known: Iterable[str], where: str = "") -> None:
+    """DembarkError unless `name` is one of the `known` cases: near matches, and how own cases are found where no folder is given."""
+    names = list(known)
+    if name not in names:
+        near = nearest(name, names)
+        near = near if near.endswith("?") else "'dembark cases' lists all"
+        raise DembarkError(f"unknown case {name!r}", where,
+                           near if own_roots() else f"{near} A case of your own: dembark --cases FOLDER ..., or {VARIABLE}=FOLDER")
 
 
 @cache

@@ -227,6 +227,9 @@ class CaseReader(TableReader):
         found = self.record(Declared, entry, table, name=name, control="; ".join(controls))
         if "evidence" in entry:
             self.pick(found.evidence, EVIDENCE, "kind of evidence", table)
+        if found.evidence == "experiment" and not found.source:
+            raise self.fail(table, "evidence = 'experiment' without source", "say who measured the reference, and where it is published",
+                            "evidence")
         if not known_unit(found.unit):
             raise self.fail(table, f"unknown unit {found.unit!r}", 'an SI unit, d or R, or "1"')
         if found.tolerance is not None and not found.evidence:

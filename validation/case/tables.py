@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
 from types import UnionType
@@ -54,22 +54,44 @@ class TableReader:
 
     def line(self, table: str, key: str) -> int | None:
         """The first line that holds `key` in `table`, which may stand in one line of the table above it; None when it is not found."""
-        parts = [] if table == "top level" else table.split(".")
+        parts = _parts(table)
         start = r"\s*[\"']?{}[\"']?\s*[.=]"
         here, above = start.format(re.escape(key)), start.format(re.escape(parts[-1] if parts else "")) + rf".*\b{re.escape(key)}\s*="
+        for number, header, text in self._lines():
+            if not text and [*parts, key] == header[:len(parts) + 1]:
+                return number
+            if (header == parts and re.match(here, text)) or (parts and header == parts[:-1] and re.match(above, text)):
+                return number
+        return None
+
+    def line_of_word(self, table: str, word: str) -> int | None:
+        """The first line of `table`, which may stand in lines of the table above it, that holds `word`; None when it is not found."""
+        parts, inside = _parts(table), False
+        for number, header, text in self._lines():
+            if header != parts:
+                # Lines that go on with an entry begin with a space.
+                new = re.match(r"[\"']?([^\s\"']+)[\"']?\s*[.=]", text)
+                inside = bool(parts) and header == parts[:-1] and (inside if new is None else new.group(1) == parts[-1])
+            if (inside or header == parts) and re.search(rf"(?<!\w){re.escape(word)}(?!\w)", text):
+                return number
+        return None
+
+    def _lines(self) -> Iterator[tuple[int, list[str], str]]:
+        """The lines of the file: number, the header that the line stands below, or is, in parts, and the text, empty for a header."""
         header: list[str] = []
         for number, text in enumerate(self.path.read_text(encoding="utf-8").splitlines(), start=1):
             found = re.fullmatch(r"\s*\[+\s*([^\[\]]+?)\s*\]+\s*(?:#.*)?", text)
             if found:
                 header = [part.strip(" \"'") for part in found.group(1).split(".")]
-            if ((found and [*parts, key] == header[:len(parts) + 1]) or (header == parts and re.match(here, text))
-                    or (parts and header == parts[:-1] and re.match(above, text))):
-                return number
-        return None
+            yield number, header, "" if found else text
 
     def pick(self, name: str, known: Iterable[str], what: str, table: str) -> str:
-        """`name` if it is among `known`, else DembarkError naming near matches."""
-        return pick(name, known, what, self.where(table))
+        """`name` if it is among `known`, else DembarkError naming the line and near matches."""
+        names = list(known)
+        if name not in names:
+            line = self.line_of_word(table, name)
+            return pick(name, names, what, self.where(table) + (f", line {line}" if line else ""))
+        return name
 
     def value(self, table: str, parameter: Parameter, given: Value) -> Value:
         """`given` in the parameter's unit and type; DembarkError that names `table` when it is not allowed."""
@@ -121,6 +143,10 @@ class TableReader:
         plain = {key: tuple(value) if isinstance(value, list) else value.strip() if isinstance(value, str) else value
                  for key, value in data.items()}
         return kind(**plain, **given)
+
+
+def _parts(table: str) -> list[str]:
+    return [] if table == "top level" else table.split(".")
 
 
 def _types(hint: Any) -> Types:

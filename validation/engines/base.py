@@ -28,8 +28,8 @@ SWITCHES = ("DEMBARK_LANES",)
 CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid carried by grains", "rolling_resistance": "couples against rolling",
                 "own_inertia": "moments of inertia other than a sphere's",
                 "creeping_friction": "friction of boxes without a spring"}
-DECK_NOTE = ("Written by dembark; SI units. The numbers without a comment follow from the others: to change a parameter, write the deck "
-             "anew with 'dembark deck'.")
+DECK_NOTE = ("Written by dembark; SI units. Do not edit a number without a comment alone: it follows from the others, as packing and "
+             "meshes do. To change a parameter, write the deck anew with 'dembark deck'.")
 
 
 @dataclass(frozen=True)

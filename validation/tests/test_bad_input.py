@@ -52,6 +52,8 @@ SETTINGS = {
 COMMANDS = {
     "misspelt command": (("runn", "silo"), "Did you mean 'run'"),
     "misspelt case": (("run", "slio", "--engine", "liggghts"), "did you mean silo?"),
+    "own case without its folder": (("deck", "mine", "--engine", "liggghts", "--out", "out"), "dembark --cases FOLDER"),
+    "own case of validate": (("validate", "--case", "mine"), "dembark --cases FOLDER"),
     "misspelt engine": (("run", "silo", "--engine", "ligghts"), "did you mean liggghts?"),
     "misspelt profile": ((*RUN, "--profile", "quikc"), "did you mean quick?"),
     "misspelt variant": ((*RUN, "--variant", "wett"), "did you mean wet"),
@@ -141,7 +143,8 @@ def test_missing_or_broken_checks_are_told_before_a_run(text: str | None, expect
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("place", ['Path(__file__).with_name("reference") / "film.csv"', 'HERE / "reference/film.csv"', 'HERE.joinpath("film.csv")'])
+@pytest.mark.parametrize("place", ['Path(__file__).with_name("reference") / "film.csv"',
+                                   'HERE / "reference/film.csv"', 'HERE.joinpath("film.csv")'])
 @pytest.mark.parametrize("content", [None, "", "time\n0\n"], ids=["missing", "empty", "there"])
 def test_a_table_that_is_not_there_is_reported_before_a_run(place: str, content: str | None, decks: Path) -> None:
     (decks / "box/measure.py").write_text("from . import curves\n")

@@ -51,7 +51,7 @@ def test_what_the_folder_says_need_not_be_written(decks: Path) -> None:
 def test_a_failure_has_the_cause_that_is_known_of_its_quantity_and_variant(decks: Path) -> None:
     case = load(edited(decks, "[runs]", """
 [quantities]
-angle = { label = "a", evidence = "experiment", tolerance = 0.1, why = "w" }
+angle = { label = "a", evidence = "experiment", tolerance = 0.1, why = "w", source = "s" }
 "part_*" = { label = "part *", evidence = "theory", tolerance = 0.1, why = "w", family = "parts" }
 [[findings]]
 quantities = ["angle", "part_1"]
@@ -206,6 +206,7 @@ variants = ["dry", "wet", "large"]
      ["quantities.b", "family 'f'", "a of the same family"]),
     ("[runs]", STUDY.replace("along", "alone") + "[runs]", ["studies.size", "alone"]),
     ("[runs]", '[quantities.k]\nlabel = "K"\nevidence = "theory"\ntolerance = 0.1\n[runs]', ["quantities.k", "a tolerance without why"]),
+    ("[runs]", '[quantities.k]\nlabel = "K"\nevidence = "experiment"\n[runs]', ["quantities.k", "without source", "line "]),
     ("[derived]\n", '[derived]\nrows = "cel(grain_count / 2)"\n', ["cel()", "did you mean ceil?"]),
     ("[runs]", '[picture]\ncolour_by = "velocity"\nscael = 1.0\n[runs]', ["did you mean scale", "[picture]"]),
     ("[runs]", '[picture]\ncolour_by = "velocity"\n[runs]', ["scale is missing", "[picture]"]),
@@ -225,7 +226,11 @@ def test_mistakes_in_a_case_file_are_told(decks: Path, old: str, new: str, words
 @pytest.mark.parametrize(("old", "new", "key"), [
     ("above = 0.0", "abov = 0.0", "abov ="), ('title = "A box"', 'titel = "A box"', "titel"),
     ("[runs]", "[rnus]", "[rnus]"), ("[runs]", '[quantities]\nk = { label = "K", evidense = "theory" }\n[runs]', "evidense"),
-    ("[runs]", "[quantities.k]\nlabel = 3\n[runs]", "label = 3"), ("[runs]", '[quantities.k]\n"labl" = "K"\n[runs]', "labl"),
+    ("[runs]", "[quantities.k]\nlabel = 3\n[runs]", "label = 3"),
+    ("[runs]", '[quantities]\nother = { label = "theori" }\nk = { label = """K\n  L""", evidence = "theori" }\n[runs]',
+     'evidence = "theori"'),
+    ("[runs]", '[quantities.k]\nlabel = "K"\n[controls]\n"gravity doubled" = ["kk"]\n[runs]', '["kk"]'),
+    ('variant = "dry"}, {', 'variant = "dri"}, {', '"dri"'), ("[runs]", '[quantities.k]\n"labl" = "K"\n[runs]', "labl"),
 ])
 def test_a_wrong_key_is_told_with_its_line(decks: Path, old: str, new: str, key: str) -> None:
     path = edited(decks, old, new)
