@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shlex
@@ -60,6 +61,45 @@ def test_python_snippet(block: Block, tmp_path: Path) -> None:
     following = next((other for other in blocks() if other.page == block.page and other.line > block.line), None)
     if following is not None and following.kind == "output":
         assert result.stdout == following.text
+
+
+def parts_of_decks() -> dict[str, list[str]]:
+    """The words in backticks in each row of the table of parts of decks, by the part."""
+    page = (ROOT / "docs/how-to/cases.md").read_text(encoding="utf-8")
+    section = page.partition("### Parts of `liggghts.in`")[2].partition("###")[0]
+    rows = re.findall(r"^\| `(\w+\.in)` \|(.*)$", section, re.MULTILINE)
+    return {name: re.findall(r"`(\w+)(?:\(p\))?`", rest) for name, rest in rows}
+
+
+def test_the_table_of_parts_names_all_of_them_and_what_they_use() -> None:
+    common = ROOT / "input_decks/common"
+    files: dict[str, str] = {}
+    for path in (*common.glob("*.in"), *common.glob("liggghts/*.in"), *common.glob("lammps/*.in")):
+        files[path.name] = files.get(path.name, "") + path.read_text(encoding="utf-8")
+    parts = parts_of_decks()
+    assert parts.keys() == files.keys()
+
+    def text(name: str) -> str:
+        return files[name] + "".join(text(one) for one in re.findall(r'include "(.+?)"', files[name]))
+
+    absent = {(name, word) for name, words in parts.items() for word in words
+              if word not in ("contacts", "friction") and not re.search(rf"\b{word}\b", text(name))}
+    assert not absent
+
+
+def test_parts_of_yade_decks_have_the_arguments_that_the_page_names() -> None:
+    page = (ROOT / "docs/how-to/cases.md").read_text(encoding="utf-8").partition("### Parts of `yade.py`")[2].partition("## ")[0]
+    rows = re.findall(r"^\| `(\w+)\((.*?)\)`", page, re.MULTILINE)
+    arguments = {}
+    for path in (ROOT / "plugins/yade/python/dembark").glob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                arguments[node.name] = next(one.args for one in node.body if isinstance(one, ast.FunctionDef) and one.name == "__init__")
+            elif isinstance(node, ast.FunctionDef):
+                arguments[node.name] = node.args
+    assert {name for name, _ in rows} == {"begin", "Recorder", "contact_loop", "engine_loop", "machine_history"}
+    for name, named in rows:
+        assert set(named.split(", ")) <= {one.arg for one in arguments[name].args}
 
 
 def run_lammps(text: str, folder: Path) -> list[list[float]]:
