@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import math
 import re
@@ -115,15 +116,38 @@ def require_steps(case: Case, values: Mapping[str, Value]) -> None:
 
 
 def require_measure(case: Case) -> None:
-    """DembarkError when `case` has no measure.py, or that names a table that is not there: its runs could not be measured. Nothing is
+    """DembarkError when `case` has no measure.py, or that names a table that nobody can read: its runs could not be measured. Nothing is
     imported."""
     code = case.folder / "measure.py"
     if not code.is_file():
         raise DembarkError(f"case {case.name} has no measure.py", str(case.folder),
                            "add one with measure(replicas), see docs/how-to/cases.md")
-    for path, line, name in imports.absent_tables(code):
-        raise DembarkError(f"case {case.name} has no file {name}, or it is empty", f"{path}, line {line}, names it",
-                           f"put it into {case.folder / 'reference'}")
+    for path, line, name, table in imports.named_tables(code):
+        named = f"{path}, line {line}, names it"
+        if table is None:
+            raise DembarkError(f"case {case.name} has no file {name}", named, f"put it into {case.folder / 'reference'}")
+        if fault := _fault(table):
+            raise DembarkError(f"{table}{fault}", named)
+
+
+def _fault(table: Path) -> str:
+    """Why nobody can read a table, for an error line: it is empty or no text, or a row of a CSV has more fields than its header."""
+    try:
+        lines = table.read_text(encoding="utf-8").splitlines(keepends=True)
+    except UnicodeDecodeError:
+        return " is not UTF-8 text"
+    if not "".join(lines).strip():
+        return " is empty"
+    header: list[str] = []
+    reader = csv.reader(lines if table.suffix == ".csv" else [])
+    for row in reader:
+        if not row or row[0].startswith("#"):
+            continue
+        header = header or row
+        # Without a comma in the header something else may separate the fields.
+        if 1 < len(header) < len(row):
+            return f", line {reader.line_num}, has {len(row)} fields, the header {len(header)}"
+    return ""
 
 
 def require_capable(case: Case, engine: str, values: Mapping[str, Value]) -> None:

@@ -85,7 +85,7 @@ def require_known(name: str, known: Iterable[str], where: str = "") -> None:
     names = list(known)
     if name not in names:
         near = nearest(name, names)
-        near = near if near.endswith("?") else "'dembark cases' lists all"
+        near = near if near.endswith("?") else "'dembark cases' lists all."
         raise DembarkError(f"unknown case {name!r}", where,
                            near if own_roots() else f"{near} A case of your own: dembark --cases FOLDER ..., or {VARIABLE}=FOLDER")
 

@@ -100,16 +100,13 @@ def names(path: Path, word: str) -> bool:
     return any(one == word or one.startswith(f"{word}/") for one in _named(path).words)
 
 
-def absent_tables(code: Path) -> list[tuple[Path, int, str]]:
-    """Tables that the Python file `code` of a case, or a module of that case that it imports, names by a path made of `__file__`, and that
-    lie neither next to it nor in the folder `reference` nor where that path ends: file, line, name. Empty files are absent, too."""
+def named_tables(code: Path) -> list[tuple[Path, int, str, Path | None]]:
+    """Tables that the Python file `code` of a case, or a module of that case that it imports, names by a path made of `__file__`: file and
+    line that name it, the name, and the table, which lies next to them or in the folder `reference`; None when there is none."""
     own = [path for path in dependencies(code).files.values() if path.suffix == ".py" and path.is_relative_to(code.parent)]
-    return [(path, line, name) for path in own for name, line in _named(path).data
-            if not any(_has_content(folder / name) for folder in (path.parent, code.parent, code.parent / "reference"))]
-
-
-def _has_content(path: Path) -> bool:
-    return path.is_file() and path.stat().st_size > 0
+    return [(path, line, name, next((place for folder in (path.parent, code.parent, code.parent / "reference")
+                                     if (place := folder / name).is_file()), None))
+            for path in own for name, line in _named(path).data]
 
 
 def _data(tree: ast.Module) -> Iterator[tuple[str, int]]:

@@ -145,21 +145,24 @@ def test_missing_or_broken_checks_are_told_before_a_run(text: str | None, expect
 
 @pytest.mark.parametrize("place", ['Path(__file__).with_name("reference") / "film.csv"',
                                    'HERE / "reference/film.csv"', 'HERE.joinpath("film.csv")'])
-@pytest.mark.parametrize("content", [None, "", "time\n0\n"], ids=["missing", "empty", "there"])
-def test_a_table_that_is_not_there_is_reported_before_a_run(place: str, content: str | None, decks: Path) -> None:
+@pytest.mark.parametrize("content", [
+    pytest.param(None, id="missing"), pytest.param(b"", id="empty"), pytest.param(b"time,x\n0,5,1\n", id="comma"),
+    pytest.param(b"time,\xff\n", id="binary"), pytest.param(b"# of 12 March, evening\ntime,x\n0,1\n1\n", id="there")])
+def test_a_table_that_cannot_be_read_is_reported_before_a_run(place: str, content: bytes | None, decks: Path) -> None:
     (decks / "box/measure.py").write_text("from . import curves\n")
     module, table = decks / "box/curves.py", decks / "box/reference/film.csv"
     module.write_text(f"HERE = Path(__file__).parent\nOUTPUT = run.folder / 'own.csv'\nFILM = {place}\n")
     table.parent.mkdir()
     if content is not None:
-        table.write_text(content)
+        table.write_bytes(content)
     box = folders.find("box")
-    if content:
+    if content and content.startswith(b"#"):
         deck.require_measure(box)
         return
     with pytest.raises(DembarkError) as caught:
         deck.require_measure(box)
-    assert all(word in str(caught.value) for word in ("case box", "film.csv", f"{module}, line 3"))
+    assert content != b"time,x\n0,5,1\n" or "line 2, has 3 fields, the header 2" in str(caught.value)
+    assert all(word in str(caught.value) for word in ("film.csv", f"{module}, line 3"))
 
 
 def test_own_decks_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
