@@ -13,14 +13,17 @@ typedef dembark::Vec3<double> Vec3;
 using dembark_family::add;
 using dembark_family::vector;
 
+inline void refuse_time_step(LAMMPS_NS::Error* error, double limit, double dt) {
+  error->one(
+      FLERR,
+      "dembark: with viscous_liquid a bridge between these grains needs a timestep <= {:.3g} s, not {:.3g} s, or a larger minimum gap",
+      limit, dt);
+}
+
 /// The run ends where a bridge that forms cannot be integrated with this time step (s).
 inline void check_time_step(LAMMPS_NS::Error* error, const dembark::Liquid& liquid, const dembark::ContactBodies& b, double dt) {
   const double limit = liquid.stable_time_step(b.effective_radius(), b.effective_mass());
-  if (dt > limit)
-    error->one(
-        FLERR,
-        "dembark: with viscous_liquid a bridge between these grains needs a timestep <= {:.3g} s, not {:.3g} s, or a larger minimum gap",
-        limit, dt);
+  if (dt > limit) refuse_time_step(error, limit, dt);
 }
 
 /// The run ends where a bridge that forms is longer than the lists of pairs look.

@@ -83,9 +83,7 @@ void PairDembarkGranular::init_style() {
   neighbor->add_request(this, NeighConst::REQ_SIZE | NeighConst::REQ_HISTORY);
   if (!history_) {
     // Without the suffix of an accelerator: that fix would be of another class.
-    Fix* const made = modify->replace_fix(
-        history_name_ + "PLACE",
-        history_name_ + "LAYOUT" + std::to_string(layout_.code()) + " all NEIGH_HISTORY " + std::to_string(layout_.size()), 0);
+    Fix* const made = modify->replace_fix(history_name_ + "PLACE", history_name_ + history_fix(), 0);
     if (dembark_lammps::left_in_restart_file(modify, history_name_))
       coefficients_.fail(
           "the restart file has histories of contacts that were computed with other options; take the same options, or begin without "
@@ -115,6 +113,10 @@ void PairDembarkGranular::init_style() {
   find_radii();
   history_->force_reneighbor = grains_grow_;
   history_->next_reneighbor = -1;
+}
+
+std::string PairDembarkGranular::history_fix() const {
+  return "LAYOUT" + std::to_string(layout_.code()) + " all NEIGH_HISTORY " + std::to_string(layout_.size());
 }
 
 void PairDembarkGranular::check_run() {

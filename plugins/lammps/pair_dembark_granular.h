@@ -41,16 +41,23 @@ class PairDembarkGranular : public Pair, dembark_family::PackedContacts {
   /// m, of all grains, those that fixes will insert included.
   double largest_radius() const;
 
+ protected:
+  dembark_lammps::ContactCoefficients coefficients_;
+  dembark::HistoryLayout layout_;
+  int freeze_bit_ = 0;
+  /// The end of the fix's name, its group, its style, and how many numbers it keeps of a contact.
+  virtual std::string history_fix() const;
+  void check_radii();
+  void refuse_coincidence(int i, int j) const override;
+  void check_reach(int i, int j, double rupture_distance) const override;
+
  private:
   static constexpr int single_numbers = 18;
-  dembark_lammps::ContactCoefficients coefficients_;
   bool packed_ = false;  // packs know the law
   class FixCapillaryLiquid* liquid_ = nullptr;
   std::string history_name_;  // begins the name of the fix
   dembark_lammps::NeighborHistory* history_ = nullptr;
-  dembark::HistoryLayout layout_;
   dembark_lammps::EnergyTally* energies_ = nullptr;
-  int freeze_bit_ = 0;
   std::vector<double> largest_radius_;  // m, of each type, for which lists are made
   bool grains_grow_ = false;            // during a run
   struct Listed {
@@ -65,15 +72,12 @@ class PairDembarkGranular : public Pair, dembark_family::PackedContacts {
   template <class Visit>
   void each_contact(Visit visit);
   const dembark::ContactParameters& law(int type_i, int type_j) const override { return coefficients_(type_i, type_j); }
-  void refuse_coincidence(int i, int j) const override;
-  void check_reach(int i, int j, double rupture_distance) const override;
   void advance_packs();
   void tally(int i, int j, const dembark::ContactBodies& bodies, const dembark::ContactForce& out);
   const double* masses() const { return rigid_.empty() ? atom->rmass : masses_.data(); }
   void take_body_masses();
   void check_run();
   void find_radii();
-  void check_radii();
   void watch_growth();
 };
 
