@@ -66,7 +66,9 @@ FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : RowsFix(lmp,
 FixWallDembark::~FixWallDembark() { memory->destroy(force_); }
 
 void FixWallDembark::find_pair() {
-  pair_ = dynamic_cast<PairDembarkGranular*>(force->pair_match(dembark_lammps::ContactCoefficients::style_name, 1));
+  const std::string name = dembark_lammps::ContactCoefficients::style_name;
+  Pair* const host = force->pair_match(name, 1);
+  pair_ = dynamic_cast<PairDembarkGranular*>(host ? host : force->pair_match(name + "/kk", 1));
   if (!pair_) fail("its coefficients are those of pair_style dembark/granular, which must come first");
 }
 

@@ -59,7 +59,8 @@ void PairDembarkGranularKokkos<DeviceType>::refuse_what_is_missing() {
     if (fix->diam_flag) refuse(name + "lets grains grow, which is not for KOKKOS");
   }
   // Other lists hand each contact to two threads, and fix neigh/history/kk keeps one history of it.
-  if (lmp->kokkos->neighflag == FULL) error->all(FLERR, "pair_style dembark/granular/kk needs half lists of neighbors; use package kokkos neigh half");
+  if (lmp->kokkos->neighflag == FULL)
+    error->all(FLERR, "pair_style dembark/granular/kk needs half lists of neighbors; use package kokkos neigh half");
   if (force->newton_pair) error->all(FLERR, "pair_style dembark/granular/kk needs 'newton off' (or package kokkos newton off)");
 }
 
