@@ -23,8 +23,8 @@ constexpr int most_numbers = 5 + 2 + dembark::ring_numbers + 3;
 
 /// `neighflag`: of the package KOKKOS; HALFTHREAD adds forces atomically. Each grain has all its owned and ghost partners (newton off).
 ///
-/// Histories are rows of layout.size() + 1 numbers. LAMMPS hands a row to the other grain of a pair with all its signs turned over. The last
-/// number says so: 1 as stored, -1 turned over, 0 without a history.
+/// Histories are rows of layout.size() + 1 numbers. LAMMPS hands a row to the other grain of a pair with all its signs turned over. The
+/// last number says so: 1 as stored, -1 turned over, 0 without a history.
 template <class DeviceType, int neighflag>
 struct ContactKernel {
   typedef ArrayTypes<DeviceType> AT;
