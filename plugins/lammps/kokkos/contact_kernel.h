@@ -140,8 +140,7 @@ struct ContactKernel {
           if (state.cohesion.rupture_distance > skin) report(Fault::reach, i, j, state.cohesion.rupture_distance);
         }
         store(i, jj, out.interacting, state);
-      } else
-        flags(i, jj) = had;
+      } else flags(i, jj) = had;
       if (!out.interacting) continue;
       own_force += out.force;
       own_torque += out.torque_1;

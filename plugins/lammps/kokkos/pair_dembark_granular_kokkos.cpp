@@ -90,8 +90,7 @@ void PairDembarkGranularKokkos<DeviceType>::compute(int eflag, int vflag) {
     atomKK->sync(Host, TYPE_MASK | RADIUS_MASK | TAG_MASK);
     check_radii();
   }
-  if (update->setupflag)
-    laws_.assign(atom->ntypes, [this](int i, int j) { return coefficients_(i, j); });
+  if (update->setupflag) laws_.assign(atom->ntypes, [this](int i, int j) { return coefficients_(i, j); });
   atomKK->sync(execution_space, datamask_read);
   if (lmp->kokkos->neighflag == HALF) advance_contacts<HALF>();
   else advance_contacts<HALFTHREAD>();
@@ -144,8 +143,7 @@ void PairDembarkGranularKokkos<DeviceType>::advance_contacts() {
     EV_FLOAT sums;
     Kokkos::parallel_reduce("dembark:contacts", grains, kernel, sums);
     for (int k = 0; k < 6; ++k) virial[k] += sums.v[k];
-  } else
-    Kokkos::parallel_for("dembark:contacts", grains, kernel);
+  } else Kokkos::parallel_for("dembark:contacts", grains, kernel);
   rows_->k_firstflag.template modify<DeviceType>();
   rows_->k_firstvalue.template modify<DeviceType>();
 }
