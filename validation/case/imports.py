@@ -167,11 +167,14 @@ def _nodes(tree: ast.AST) -> Iterator[ast.AST]:
         yield from _nodes(node)
 
 
-@cache
 def _neighbour(path: Path, name: str) -> Path | None:
     """File of the module that the file `path` calls `name`, with points in front; the folder of a case needs no __init__.py for it."""
     parts = name.lstrip(".").split(".")
     folder = path.parents[len(name) - len(name.lstrip(".")) - 1]
+    for root in dembark.__path__:
+        if folder.is_relative_to(root):
+            return module_file(".".join((_PACKAGE, *folder.relative_to(root).parts, *parts)))
+    # Of a user's own case, whose files may come while the process runs.
     package = folder / "__init__.py"
     return _module_in([folder], parts) or (package if package.is_file() else None)
 

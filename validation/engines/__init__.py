@@ -20,22 +20,8 @@ from .lammps import Lammps
 from .liggghts import Liggghts
 from .yade import Yade
 
-__all__ = [
-    "CAPABILITIES",
-    "ENGINES",
-    "DeckNumber",
-    "Engine",
-    "EngineFacts",
-    "absent",
-    "call",
-    "end_with_parent",
-    "engine_class",
-    "facts",
-    "find",
-    "mpi_launcher",
-    "names",
-    "titles",
-]
+__all__ = ["CAPABILITIES", "ENGINES", "DeckNumber", "Engine", "EngineFacts", "absent", "call", "end_with_parent", "engine_class", "facts",
+           "find", "mpi_launcher", "names", "titles"]
 
 ENGINES: tuple[type[Engine], ...] = (Liggghts, Yade, Lammps)
 

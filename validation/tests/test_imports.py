@@ -101,3 +101,12 @@ def test_cases_may_have_modules_of_one_name(tmp_path: Path) -> None:
         (tmp_path / name / "measure.py").write_text("from .helper import NAME\n")
     found = [deck.load_module(tmp_path / name / "measure.py", f"dembark_measure_{name}") for name in ("first", "second")]
     assert [one.NAME for one in found] == ["first", "second"]
+
+
+def test_a_neighbour_that_comes_later_is_found(tmp_path: Path) -> None:
+    """A user's case may change while a process runs."""
+    code = tmp_path / "measure.py"
+    code.write_text("from .later import number\n")
+    assert set(imports.dependencies(code).files) == {"measure.py"}
+    (tmp_path / "later.py").write_text("number = 1\n")
+    assert set(imports.dependencies(code).files) == {"measure.py", "later.py"}
