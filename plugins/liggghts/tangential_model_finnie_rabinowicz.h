@@ -108,47 +108,44 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     const bool update_history = d.computeflag && d.shearupdate;
     const double dt = update_history ? update->dt : 0.0, radius = d.is_wall ? d.radi : d.radi * d.radj / d.radsum;
     const dembark::NormalResponse<double> response{d.Fn, d.kt, d.gammat, dembark::pi * radius * d.deltan, d.kn, d.kn * d.deltan};
-    double* const history = d.contact_history + offset_;
-    dembark::FrictionState<double> state = dembark_liggghts::load_friction(history);
-    dembark::SlipRings rings;
-    if (rings_ >= 0) rings = dembark_liggghts::load_rings(d.contact_history + rings_);
+    dembark::ContactState state;
+    state.friction = dembark_liggghts::load_friction(d.contact_history + offset_);
+    if (rings_ >= 0) state.rings = dembark_liggghts::load_rings(d.contact_history + rings_);
+    if (angle_ >= 0) state.rolling_angle = vector(d.contact_history + angle_);
+    const bool rolls = rolling_model() != dembark::RollingModel::off && rolling_(d.itype, d.jtype).on();
+    const dembark::RollingResistance resistance = rolls ? rolling_(d.itype, d.jtype) : dembark::RollingResistance{};
+    const double inertia = !rolls      ? 0.0
+                           : d.is_wall ? dembark::relative_inertia(d.mi, d.radi, INFINITY, INFINITY)
+                                       : dembark_liggghts::pair_inertia(*atom, *pair_, d.i, d.mi, d.j, d.mj);
     dembark::ContactForce out;
     out.normal = vector(d.en);
     const dembark::Vec3<double> spin_i = vector(d.omega_i), spin_j = d.is_wall ? dembark_liggghts::wall_spin(d) : vector(d.omega_j);
-    const double twist = contact_twist(out.normal, spin_i, spin_j, dt);
     dembark::RelativeMotion motion{d.vn, {d.vtr1, d.vtr2, d.vtr3}, d.cri, d.is_wall ? -0.5 * d.deltan : d.crj};
     // The engine takes the velocity of a wall at its surface.
     if (d.is_wall) motion.tangential_velocity -= cross(motion.arm_2 * spin_j, out.normal);
-    out.tangential = contact_friction(laws_(d.itype, d.jtype), out.normal, twist, response, motion.tangential_velocity, dt, state, &rings);
+    dembark::SurfaceLaws laws{laws_(d.itype, d.jtype), resistance, radius, inertia, dt, state, out};
+    out.tangential = surface_forces(out.normal, response, motion.tangential_velocity, spin_i, spin_j, dt, laws);
     assemble(motion, out);
-    dembark::Vec3<double> angle;
-    const bool rolls = rolling_model() != dembark::RollingModel::off && rolling_(d.itype, d.jtype).on();
-    if (rolls) {
-      if (angle_ >= 0) angle = vector(d.contact_history + angle_);
-      const double inertia = d.is_wall ? dembark::relative_inertia(d.mi, d.radi, INFINITY, INFINITY)
-                                       : dembark_liggghts::pair_inertia(*atom, *pair_, d.i, d.mi, d.j, d.mj);
-      const dembark::RollingContact contact{out.normal, twist, radius, inertia, d.Fn, d.kt, spin_i - spin_j};
-      add_couple(rolling_step(rolling_(d.itype, d.jtype), contact, dt, angle), out);
-    }
-    if (update_history) store(d.contact_history, state, rings, angle);
+    if (rolls) add_couple(out.rolling, out);
+    if (update_history) store(d.contact_history, state);
     dembark_liggghts::add_force(out, d, i_forces, j_forces);
     if (!tally_) return;
     dembark::ContactParts parts;
-    split_touching(parts, out.normal, d.deltan, d.kn * d.deltan, exponent_, d.Fn, d.kt, out.tangential, state.displacement,
-                   rings_ >= 0 ? &rings : nullptr);
-    if (rolls) split_rolling(parts, out.rolling, angle, dembark::rolling_stiffness(d.kt, radius));
+    split_touching(parts, out.normal, d.deltan, d.kn * d.deltan, exponent_, d.Fn, d.kt, out.tangential, state.friction.displacement,
+                   rings_ >= 0 ? &state.rings : nullptr);
+    if (rolls) split_rolling(parts, out.rolling, state.rolling_angle, dembark::rolling_stiffness(d.kt, radius));
     tally_->add(d, out.normal, parts, motion);
   }
 
   inline void surfacesClose(SurfacesCloseData& d, ForceData&, ForceData&) {
     if (d.contact_flags) *d.contact_flags &= ~CONTACT_TANGENTIAL_MODEL;
-    if (d.contact_history) store(d.contact_history, {}, {}, {});
+    if (d.contact_history) store(d.contact_history, {});
   }
 
   inline void beginPass(SurfacesIntersectData&, ForceData&, ForceData&) {
     if (!pair_) return;
     dembark_liggghts::end_parted_pairs(*pair_, *atom, neighbor->contactDistanceFactor, CONTACT_TANGENTIAL_MODEL,
-                                       [this](int, int, double* history) { store(history, {}, {}, {}); });
+                                       [this](int, int, double* history) { store(history, {}); });
   }
   inline void endPass(SurfacesIntersectData&, ForceData&, ForceData&) {}
 
@@ -159,11 +156,10 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     return wall_ ? wall_->contact_match(kind, model) : pair_->contact_match(kind, model);
   }
 
-  void store(double* history, const dembark::FrictionState<double>& state, const dembark::SlipRings& rings,
-             const dembark::Vec3<double>& angle) const {
-    dembark_liggghts::store_friction(history + offset_, state);
-    if (rings_ >= 0) dembark_liggghts::store_rings(history + rings_, rings);
-    if (angle_ >= 0) dembark_liggghts::store(history + angle_, angle);
+  void store(double* history, const dembark::ContactState& state) const {
+    dembark_liggghts::store_friction(history + offset_, state.friction);
+    if (rings_ >= 0) dembark_liggghts::store_rings(history + rings_, state.rings);
+    if (angle_ >= 0) dembark_liggghts::store(history + angle_, state.rolling_angle);
   }
 };
 

@@ -1,9 +1,9 @@
 // One contact: kinematics, normal force, Finnie-Rabinowicz friction, rolling resistance and cohesion, for two spheres or a sphere and a
 // wall.
 //
-// contact_step() is the contact as YADE and Python have it. An engine that computes contacts model by model (LIGGGHTS), or many at once,
-// calls the stages that it is made of: surface_motion(), hertz() or hooke() and adjusted(), contact_friction(), cohesion_step() and
-// bridge_resistance(), assemble(), rolling_step() and add_couple().
+// contact_step() is the contact as YADE, LAMMPS and Python have it. Its order stands in contact_order.hpp, which packs of contacts follow
+// too. LIGGGHTS computes contacts model by model and calls parts of it: surface_forces(), cohesion_step() and bridge_resistance(),
+// assemble() and add_couple().
 //
 // Conventions: the unit normal points from body 2 to body 1; forces are those on body 1. A wall is body 2 with an infinite radius
 // and an infinite mass; its position and velocity are those of its surface at the contact, and it turns by `wall_spin`. Lever arms reach
@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "cohesion/cohesion.hpp"
+#include "contact_order.hpp"
 #include "finnie_rabinowicz.hpp"
-#include "kinematics.hpp"
 #include "normal_force.hpp"
 #include "partial_slip.hpp"
 #include "rolling_resistance.hpp"
@@ -82,6 +82,9 @@ struct ContactBodies {
   DEMBARK_FUNCTION double effective_mass() const { return reduced(mass_1, mass_2); }
   DEMBARK_FUNCTION Vec3<double> spin_2() const { return angular_velocity_2 + wall_spin; }
   DEMBARK_FUNCTION Vec3<double> relative_spin() const { return angular_velocity_1 - spin_2(); }
+  DEMBARK_FUNCTION ContactPair<double> pair() const {
+    return {separation, velocity_1 - velocity_2, angular_velocity_1, spin_2(), radius_1, std::isinf(radius_2) ? 0.0 : radius_2};
+  }
 };
 
 struct ContactForce {
@@ -102,8 +105,8 @@ struct ContactForce {
 typedef SurfaceMotion<double> RelativeMotion;
 
 DEMBARK_FUNCTION inline RelativeMotion relative_motion(const ContactBodies& b, const Vec3<double>& normal, double overlap) {
-  const double arm_1 = b.radius_1 - 0.5 * overlap, arm_2 = (std::isinf(b.radius_2) ? 0.0 : b.radius_2) - 0.5 * overlap;
-  return surface_motion(normal, b.velocity_1 - b.velocity_2, arm_1, b.angular_velocity_1, arm_2, b.spin_2());
+  const ContactPair<double> pair = b.pair();
+  return surface_motion(normal, pair.velocity, pair.radius_1 - 0.5 * overlap, pair.spin_1, pair.radius_2 - 0.5 * overlap, pair.spin_2);
 }
 
 /// Friction of touching surfaces (N, on body 1): the spring turns with the pair by `twist` (rad, of contact_twist), then it sticks or
@@ -128,12 +131,13 @@ DEMBARK_FUNCTION inline void bridge_resistance(const Liquid& liquid, const Conta
   out.viscous_tangential = -resistance.tangential * motion.tangential_velocity;
 }
 
-/// Forces along the surface turn the bodies, those along the normal do not.
+/// Force and torques of the parts that `out` has.
 DEMBARK_FUNCTION inline void assemble(const RelativeMotion& motion, ContactForce& out) {
-  const Vec3<double> along_surface = out.tangential + out.viscous_tangential, moment = cross(out.normal, along_surface);
-  out.torque_1 = -motion.arm_1 * moment;
-  out.torque_2 = -motion.arm_2 * moment;
-  out.force = (out.normal_force - out.cohesive_force + out.viscous_normal) * out.normal + along_surface;
+  const double along_normal = out.normal_force - out.cohesive_force + out.viscous_normal;
+  const Assembly<double> all = assembled(out.normal, along_normal, out.tangential + out.viscous_tangential);
+  out.torque_1 = -motion.arm_1 * all.moment;
+  out.torque_2 = -motion.arm_2 * all.moment;
+  out.force = all.force;
 }
 
 /// The couple of rolling resistance, into what is assembled.
@@ -143,46 +147,80 @@ DEMBARK_FUNCTION inline void add_couple(const Vec3<double>& couple, ContactForce
   out.torque_2 -= couple;
 }
 
+/// The laws of one contact along its surfaces, for surface_forces().
+struct SurfaceLaws {
+  const FinnieRabinowicz& friction_law;
+  const RollingResistance& resistance;
+  double effective_radius, inertia;  ///< m; kg m^2, of the relative spin, used by rolling resistance only
+  double dt;                         ///< s
+  ContactState& state;
+  ContactForce& out;
+
+  DEMBARK_HOT Vec3<double> friction(const Vec3<double>& normal, double twist, const NormalResponse<double>& response,
+                                    const Vec3<double>& velocity) {
+    return contact_friction(friction_law, normal, twist, response, velocity, dt, state.friction, &state.rings);
+  }
+  DEMBARK_HOT void roll(const Vec3<double>& normal, double twist, const NormalResponse<double>& response, const Vec3<double>& spin) {
+    if (resistance.on())
+      out.rolling =
+          rolling_step(resistance, {normal, twist, effective_radius, inertia, response.force, response.tangential_stiffness, spin}, dt,
+                       state.rolling_angle);
+  }
+};
+
+/// All laws of one contact, for contact_order().
+struct ContactLaws : SurfaceLaws {
+  const ContactParameters& p;
+  const ContactBodies& b;
+
+  DEMBARK_FUNCTION ContactLaws(const ContactParameters& parameters, const ContactBodies& bodies, double step, ContactState& now,
+                               ContactForce& force)
+      : SurfaceLaws{parameters.friction,
+                    parameters.rolling,
+                    bodies.effective_radius(),
+                    parameters.rolling.on() ? relative_inertia(bodies.mass_1, bodies.radius_1, bodies.mass_2, bodies.radius_2) : 0.0,
+                    step,
+                    now,
+                    force},
+        p(parameters),
+        b(bodies) {}
+
+  DEMBARK_HOT bool touches(double overlap) const { return overlap > 0.0; }
+  DEMBARK_HOT NormalResponse<double> respond(double overlap, double normal_velocity) const {
+    return adjusted(p.respond(effective_radius, b.effective_mass(), overlap, normal_velocity), p.limit_force, p.tangential_damping);
+  }
+  DEMBARK_HOT double attract(double overlap) {
+    return cohesion_step(p.cohesion, {b.radius_1, b.radius_2, -overlap, touches(overlap), p.elasticity.effective_youngs_modulus},
+                         state.cohesion);
+  }
+  DEMBARK_HOT void act(const Vec3<double>& normal, double overlap, const RelativeMotion& motion, const NormalResponse<double>& response,
+                       const Vec3<double>& friction, double attraction) {
+    out.normal = normal;
+    out.overlap = overlap;
+    out.normal_force = response.force;
+    out.cohesive_force = attraction;
+    out.tangential = friction;
+    out.normal_stiffness = response.normal_stiffness;
+    out.tangential_stiffness = response.tangential_stiffness;
+    const double volume = state.cohesion.bridge_volume;
+    if (p.cohesion.liquid.viscous.on() && volume > 0.0) bridge_resistance(p.cohesion.liquid, b, volume, motion, out);
+    if (!touches(overlap)) {
+      state.friction = {};
+      state.rolling_angle = {};
+      if (friction_law.presliding == Presliding::partial_slip) state.rings = {};
+    }
+    assemble(motion, out);
+    if (resistance.on()) add_couple(out.rolling, out);
+    out.interacting = touches(overlap) || state.cohesion.held();
+  }
+};
+
 /// One step of one contact. `dt` in s. Coincident centres, and a centre on a wall, have no normal: it and the force are no numbers, and an
 /// engine ends its run.
 DEMBARK_FUNCTION inline ContactForce contact_step(const ContactParameters& p, const ContactBodies& b, double dt, ContactState& state) {
   ContactForce out;
-  const double distance = norm(b.separation);
-  out.overlap = b.radius_1 + (std::isinf(b.radius_2) ? 0.0 : b.radius_2) - distance;
-  out.normal = b.separation * (1.0 / distance);
-
-  const bool touching = out.overlap > 0.0;
-  out.cohesive_force =
-      cohesion_step(p.cohesion, {b.radius_1, b.radius_2, -out.overlap, touching, p.elasticity.effective_youngs_modulus}, state.cohesion);
-  const Liquid& liquid = p.cohesion.liquid;
-  const bool viscous = liquid.viscous.on() && state.cohesion.bridge_volume > 0.0;
-  RelativeMotion motion;
-  Vec3<double> couple{};
-  if (touching || viscous) motion = relative_motion(b, out.normal, out.overlap);
-  if (viscous) bridge_resistance(liquid, b, state.cohesion.bridge_volume, motion, out);
-
-  if (touching) {
-    const NormalResponse<double> response = adjusted(
-        p.respond(b.effective_radius(), b.effective_mass(), out.overlap, motion.normal_velocity), p.limit_force, p.tangential_damping);
-    const double twist = contact_twist(out.normal, b.angular_velocity_1, b.spin_2(), dt);
-    out.normal_force = response.force;
-    out.normal_stiffness = response.normal_stiffness;
-    out.tangential_stiffness = response.tangential_stiffness;
-    out.tangential =
-        contact_friction(p.friction, out.normal, twist, response, motion.tangential_velocity, dt, state.friction, &state.rings);
-    if (p.rolling.on())
-      couple = rolling_step(p.rolling,
-                            {out.normal, twist, b.effective_radius(), relative_inertia(b.mass_1, b.radius_1, b.mass_2, b.radius_2),
-                             response.force, response.tangential_stiffness, b.relative_spin()},
-                            dt, state.rolling_angle);
-  } else {
-    state.friction = {};
-    state.rolling_angle = {};
-    if (p.friction.presliding == Presliding::partial_slip) state.rings = {};
-  }
-  assemble(motion, out);
-  if (p.rolling.on()) add_couple(couple, out);
-  out.interacting = touching || state.cohesion.held();
+  ContactLaws laws(p, b, dt, state, out);
+  contact_order(b.pair(), dt, laws);
   return out;
 }
 

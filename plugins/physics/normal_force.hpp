@@ -39,14 +39,12 @@ DEMBARK_FUNCTION inline double effective_shear_modulus(double youngs_1, double p
   return 1.0 / (2.0 * (2.0 - poisson_1) * (1.0 + poisson_1) / youngs_1 + 2.0 * (2.0 - poisson_2) * (1.0 + poisson_2) / youngs_2);
 }
 
-/// R* or m* of two bodies; an infinite partner (a wall) leaves the other's value. Infinite if both are.
-template <class Real>
-DEMBARK_FUNCTION inline Real reduced(Real a, Real b) {
-  using std::isinf;
-  if (isinf(b)) return a;
-  if (isinf(a)) return b;
-  return a * b / (a + b);
+/// R* or m* of two bodies; a partner that is infinite (a wall, or held) leaves the other's value. Infinite if both are.
+template <class Real, class Truth>
+DEMBARK_HOT Real reduced(Real a, Real b, Truth a_infinite, Truth b_infinite) {
+  return select(b_infinite, a, select(a_infinite, b, a * b / (a + b)));
 }
+DEMBARK_FUNCTION inline double reduced(double a, double b) { return reduced(a, b, bool(std::isinf(a)), bool(std::isinf(b))); }
 
 /// What the normal contact hands on to the tangential law.
 template <class Real>

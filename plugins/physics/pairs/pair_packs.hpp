@@ -5,9 +5,8 @@
 
 #include <cstddef>
 
+#include "../contact_order.hpp"
 #include "../finnie_rabinowicz.hpp"
-#include "../kinematics.hpp"
-#include "../normal_force.hpp"
 #include "../partial_slip.hpp"
 #include "pack_rows.hpp"
 #include "pair_step.hpp"
@@ -238,55 +237,38 @@ DEMBARK_HOT void scatter(const PairStep& s, const int* grain, const int* partner
   }
 }
 
-/// Forces of the picked pairs, by the stages of dembark/contact.hpp. `Elastic`: friction is limited by the force of the spring alone.
+/// The laws of a pack of contacts, for contact_order(). `Elastic`: friction is limited by the force of the spring alone.
 template <class P, bool Elastic>
-inline void compute(const PairStep& s, PairBlock& b, int found) {
-  constexpr int N = P::size;
-  repeat_last<P>(b, found);
-  PackedCoefficients<P> law = gathered_laws<P>(s.laws, b.law_index);
-  for (int first = 0; first < found; first += N) {
-    const int *i = b.grain + first, *j = b.partner + first, count = found - first < N ? found - first : N;
-    const unsigned there = (1u << count) - 1;
-    if (!s.one_law) law = gathered_laws<P>(s.laws, b.law_index + first);
-    const P radius_i = values<P>(s.radius, i), radius_j = values<P>(s.radius, j), radius_sum = radius_i + radius_j;
-    const PackVec<P> delta = rows3<P>(s.x, i) - rows3<P>(s.x, j);
-    const P squared = dot(delta, delta), distance = sqrt(squared), overlap = radius_sum - distance, half = 0.5 * overlap;
-    const PackVec<P> normal = delta * (1.0 / distance);
-    const auto touching = squared < radius_sum * radius_sum;
-    const unsigned apart = ~bits(touching) & there;
+struct PackLaws {
+  static constexpr int N = P::size;
+  const PairStep& s;
+  PairBlock& b;
+  const PackedCoefficients<P>& law;
+  const int first, count;
+  const P effective_radius, effective_mass;
+  const LaneMask<P> touching;
+  const unsigned there = (1u << count) - 1, apart = ~bits(touching) & there;
 
-    const P mass_i = values<P>(s.mass, i), mass_j = values<P>(s.mass, j);
-    P reduced_mass = mass_i * mass_j / (mass_i + mass_j);
-    if (s.frozen) {
-      const auto is_frozen = [&s](const int* grain) {
-        return collect<P>([&s, grain](int k) { return s.mask[grain[k]] & s.frozen ? 1.0 : 0.0; }) > 0.0;
-      };
-      // Between two held grains there is no damping (ContactParameters::respond).
-      const auto held_i = is_frozen(i), held_j = is_frozen(j);
-      reduced_mass = select(held_i & held_j, P(0.0), select(held_j, mass_i, select(held_i, mass_j, reduced_mass)));
-    }
-    const PackVec<P> omega_i = rows3<P>(s.omega, i), omega_j = rows3<P>(s.omega, j);
-    const SurfaceMotion<P> motion =
-        surface_motion<P>(normal, rows3<P>(s.v, i) - rows3<P>(s.v, j), radius_i - half, omega_i, radius_j - half, omega_j);
-    NormalResponse<P> response =
-        adjusted(hertz<PackedCoefficients<P>, P>(law, radius_i * radius_j / radius_sum, reduced_mass, overlap, motion.normal_velocity),
-                 s.limit_force, s.tangential_damping);
-    // Until friction is known, the force that limits it is the normal one here.
-    [[maybe_unused]] P with_damping;
-    if constexpr (Elastic) {
-      with_damping = response.force;
-      response.force = response.elastic_force;
-    }
+  // All lanes are computed; act() drops what pairs apart have no part in.
+  DEMBARK_HOT bool touches(const P&) const { return true; }
 
-    const auto history = [=, &b, &s](int k) { return b.history[first + k] + s.offset; };
-    const P dt = s.dt, twist = contact_twist<P>(normal, omega_i, omega_j, dt);
+  DEMBARK_HOT NormalResponse<P> respond(const P& overlap, const P& normal_velocity) const {
+    return adjusted(hertz<PackedCoefficients<P>, P>(law, effective_radius, effective_mass, overlap, normal_velocity), s.limit_force,
+                    s.tangential_damping);
+  }
+
+  DEMBARK_HOT PackVec<P> friction(const PackVec<P>& normal, const P& twist, NormalResponse<P> response, const PackVec<P>& velocity) const {
+    // Here the force is the one that limits friction.
+    if constexpr (Elastic) response.force = response.elastic_force;
+    const auto history = [this](int k) { return b.history[first + k] + s.offset; };
+    const P dt = s.dt;
     const Quad<P> old = rows<P, 4>(history);
     FrictionState<P> state{{old.x, old.y, old.z}, old.w, collect<P>([=](int k) { return history(k)[4]; })};
     unsigned served = 0, slipping = 0;
     P kept_slip = law.kept_slip;
     Slip<P> slip;
     if (s.rings < 0) {
-      const PackVec<P> increment = motion.tangential_velocity * dt;
+      const PackVec<P> increment = velocity * dt;
       state.displacement = rotate_to_plane<P>(state.displacement, normal, twist);
       state.displacement += increment;
       const auto sticks = plainly_sticks(law, response.force, response.tangential_stiffness, response.contact_area, state);
@@ -297,10 +279,9 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
         served |= slip.sticks | slipping;
       }
     } else if (s.pack_friction) {
-      served = partial_slip<P>(s, b, first, there & ~apart, law, normal, twist, motion.tangential_velocity, response, state, kept_slip);
+      served = partial_slip<P>(s, b, first, there & ~apart, law, normal, twist, velocity, response, state, kept_slip);
     }
-    PackVec<P> tangential =
-        sticking_force<P>(response.tangential_stiffness, response.tangential_damping, motion.tangential_velocity, dt, kept_slip, state);
+    PackVec<P> tangential = sticking_force<P>(response.tangential_stiffness, response.tangential_damping, velocity, dt, kept_slip, state);
     if (slipping) {
       replace<P>(slip.slips, state.displacement, slip.moved.displacement);
       state.slip = select(slip.slips, slip.moved.slip, state.slip);
@@ -308,8 +289,7 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       replace<P>(slip.slips, tangential, -response.tangential_stiffness * state.displacement);
     }
     if (apart) {  // such a pair has forgotten its contact
-      const auto forget = [&touching](P& part) __attribute__((always_inline)) { part = select(touching, part, P(0.0)); };
-      forget(response.force);
+      const auto forget = [this](P& part) __attribute__((always_inline)) { part = select(touching, part, P(0.0)); };
       forget(tangential.x), forget(tangential.y), forget(tangential.z);
       forget(state.displacement.x), forget(state.displacement.y), forget(state.displacement.z);
       forget(state.slip);
@@ -334,29 +314,77 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
         __builtin_memcpy(history(k), rows[k], sizeof rows[k]);
         history(k)[4] = energy[k];
       }
-      scalar_friction<P>(s, b, first, there & ~packed, normal, twist, motion.tangential_velocity, response, tangential);
+      scalar_friction<P>(s, b, first, there & ~packed, normal, twist, velocity, response, tangential);
     }
+    return tangential;
+  }
 
-    if constexpr (Elastic) response.force = select(touching, with_damping, P(0.0));
-    if (s.rolls) scalar_rolling<P>(s, b, first, there & ~apart, normal, twist, omega_i - omega_j, response);
-    if (s.wet) {
-      alignas(64) double gap[N], pull[N];
-      (distance - radius_sum).store(gap);
-      s.scalar.bridges(b, first, count, gap, pull);
-      response.force -= P::load(pull);
-    }
-    const PackVec<P> force = response.force * normal + tangential, moment = cross(normal, tangential);
+  DEMBARK_HOT void roll(const PackVec<P>& normal, const P& twist, const NormalResponse<P>& response, const PackVec<P>& spin) const {
+    if (s.rolls) scalar_rolling<P>(s, b, first, there & ~apart, normal, twist, spin, response);
+  }
+
+  DEMBARK_HOT P attract(const P& overlap) const {
+    if (!s.wet) return 0.0;
+    alignas(64) double gap[N], pull[N];
+    (-overlap).store(gap);
+    s.scalar.bridges(b, first, count, gap, pull);
+    return P::load(pull);
+  }
+
+  DEMBARK_HOT void act(const PackVec<P>& normal, const P&, const SurfaceMotion<P>& motion, const NormalResponse<P>& response,
+                       const PackVec<P>& friction, const P& attraction) const {
+    P along_normal = response.force;
+    if (apart) along_normal = select(touching, along_normal, P(0.0));
+    along_normal -= attraction;
+    const Assembly<P> all = assembled<P>(normal, along_normal, friction);
     alignas(64) double forces[N][4], moments[N][4];
-    store_rows(Quad<P>{force.x, force.y, force.z, motion.arm_1}, [&forces](int k) { return forces[k]; });
-    store_rows(Quad<P>{moment.x, moment.y, moment.z, motion.arm_2}, [&moments](int k) { return moments[k]; });
-    if (s.f) scatter<P>(s, i, j, forces, moments, count);
-    if (!s.results) continue;
-    const PackVec<P> along = force - tangential;
+    store_rows(Quad<P>{all.force.x, all.force.y, all.force.z, motion.arm_1}, [&forces](int k) { return forces[k]; });
+    store_rows(Quad<P>{all.moment.x, all.moment.y, all.moment.z, motion.arm_2}, [&moments](int k) { return moments[k]; });
+    if (s.f) scatter<P>(s, b.grain + first, b.partner + first, forces, moments, count);
+    if (!s.results) return;
+    const PackVec<P> along = all.force - friction;
     alignas(64) double normals[N][4], frictions[N][4];
     store_rows(Quad<P>{along.x, along.y, along.z, response.normal_stiffness}, [&normals](int k) { return normals[k]; });
-    store_rows(Quad<P>{tangential.x, tangential.y, tangential.z, response.tangential_stiffness},
-               [&frictions](int k) { return frictions[k]; });
+    store_rows(Quad<P>{friction.x, friction.y, friction.z, response.tangential_stiffness}, [&frictions](int k) { return frictions[k]; });
     s.results->store(b, first, count, {forces, moments, normals, frictions});
+  }
+};
+
+/// Forces of the picked pairs.
+template <class P, bool Elastic>
+inline void compute(const PairStep& s, PairBlock& b, int found) {
+  constexpr int N = P::size;
+  repeat_last<P>(b, found);
+  PackedCoefficients<P> law = gathered_laws<P>(s.laws, b.law_index);
+  for (int first = 0; first < found; first += N) {
+    const int *i = b.grain + first, *j = b.partner + first;
+    if (!s.one_law) law = gathered_laws<P>(s.laws, b.law_index + first);
+    const P radius_i = values<P>(s.radius, i), radius_j = values<P>(s.radius, j), radius_sum = radius_i + radius_j;
+    const ContactPair<P> pair{rows3<P>(s.x, i) - rows3<P>(s.x, j),
+                              rows3<P>(s.v, i) - rows3<P>(s.v, j),
+                              rows3<P>(s.omega, i),
+                              rows3<P>(s.omega, j),
+                              radius_i,
+                              radius_j};
+    const P mass_i = values<P>(s.mass, i), mass_j = values<P>(s.mass, j);
+    P reduced_mass = mass_i * mass_j / (mass_i + mass_j);
+    if (s.frozen) {
+      const auto is_frozen = [&s](const int* grain) {
+        return collect<P>([&s, grain](int k) { return s.mask[grain[k]] & s.frozen ? 1.0 : 0.0; }) > 0.0;
+      };
+      // Between two held grains there is no damping (ContactParameters::respond).
+      const auto held_i = is_frozen(i), held_j = is_frozen(j);
+      reduced_mass = select(held_i & held_j, P(0.0), reduced(mass_i, mass_j, held_i, held_j));
+    }
+    const PackLaws<P, Elastic> laws{s,
+                                    b,
+                                    law,
+                                    first,
+                                    found - first < N ? found - first : N,
+                                    radius_i * radius_j / radius_sum,
+                                    reduced_mass,
+                                    dot(pair.separation, pair.separation) < radius_sum * radius_sum};
+    contact_order<P>(pair, s.dt, laws);
   }
 }
 
