@@ -169,8 +169,9 @@ def test_keywords_of_liggghts_exist() -> None:
     assert set(registered) <= told
 
 
-# The names that engines and Python make of the table of parameters.
-TABLE = " ".join(f'"{row[key]}"' for row in _physics.contact_parameters() for key in ("name", "camel_case", "liggghts"))
+# The names that engines and Python make of the tables of parameters and choices.
+TABLE = " ".join(f'"{row[key]}"' for row in (*_physics.contact_parameters(), *_physics.contact_choices())
+                 for key in ("name", "camel_case", "liggghts") if key in row)
 
 
 @pytest.mark.parametrize(("engine", "folders"), [

@@ -22,6 +22,14 @@ std::string list(const std::vector<std::string>& names) {
 
 std::string types(int i, int j) { return "types " + std::to_string(i) + "-" + std::to_string(j); }
 
+/// Of all pairs, and not behind a word of the law that it belongs to.
+bool is_keyword(const dembark::Parameter& p) {
+  using dembark::ContactNumber;
+  for (const ContactNumber behind : {ContactNumber::characteristic_velocity, ContactNumber::liquid_viscosity, ContactNumber::minimum_gap})
+    if (&p == &parameter(behind)) return false;
+  return p.scope == dembark::Scope::global;
+}
+
 }  // namespace
 
 /// The numbers of one pair of types, for dembark::read_contact().
@@ -74,19 +82,28 @@ void ContactCoefficients::settings(int narg, char** arg) {
     if (!p.allows(value)) fail(dembark::wrong_value(p, p.name, value));
     global_[std::size_t(which)] = value;
   };
+  std::vector<std::string> keywords = {"normal",         "cohesion",           "capillary_model", "viscous_liquid",
+                                       "carried_liquid", "tangential_damping", "limit_force"};
+  each_choice(options_, [&](const char* name, auto&&...) { keywords.emplace_back(name); });
+  for (const dembark::Parameter& each : dembark::contact_parameters)
+    if (is_keyword(each)) keywords.emplace_back(each.name);
   for (int k = 0; k < narg;) {
     const std::string keyword = arg[k++];
     const auto word = [&]() -> const char* {
       if (k == narg) fail(keyword + " needs a value");
       return arg[k++];
     };
+    bool chosen = false;
+    each_choice(options_, [&](const char* name, const char*, auto& option, const auto& values, const char*) {
+      if (keyword != name) return;
+      choose(keyword, word(), values, option);
+      chosen = true;
+    });
+    if (chosen) continue;
     if (keyword == "normal") {
       choose(keyword, word(), dembark::normal_law_names(), options_.normal_law);
       if (options_.normal_law == dembark::NormalLaw::hooke) set(ContactNumber::characteristic_velocity, number("normal hooke", word()));
-    } else if (keyword == "presliding") choose(keyword, word(), dembark::presliding_names(), options_.presliding);
-    else if (keyword == "friction_limit") choose(keyword, word(), dembark::friction_limit_names(), options_.friction_limit);
-    else if (keyword == "rolling_resistance") choose(keyword, word(), dembark::rolling_names(), options_.rolling_model);
-    else if (keyword == "cohesion") {
+    } else if (keyword == "cohesion") {
       choose(keyword, word(), dembark::cohesion_names(), options_.cohesion);
       dry = options_.cohesion != dembark::CohesionLaw::bridge;
     } else if (keyword == "capillary_model") {
@@ -100,12 +117,9 @@ void ContactCoefficients::settings(int narg, char** arg) {
     } else if (keyword == "carried_liquid") choose(keyword, word(), off_on, options_.carried_liquid);
     else if (keyword == "tangential_damping") choose(keyword, word(), off_on, options_.tangential_damping);
     else if (keyword == "limit_force") choose(keyword, word(), off_on, options_.limit_force);
-    else if (keyword == "surface_tension") set(ContactNumber::surface_tension, number(keyword, word()));
-    else if (keyword == "healing_time") set(ContactNumber::healing_time, number(keyword, word()));
-    else
-      fail("'" + keyword +
-           "' is unknown; it can be normal, presliding, friction_limit, rolling_resistance, cohesion, capillary_model, surface_tension, "
-           "viscous_liquid, carried_liquid, healing_time, tangential_damping or limit_force");
+    else if (const dembark::Parameter* const known = dembark::parameter(keyword); known && is_keyword(*known))
+      set(static_cast<ContactNumber>(known - dembark::contact_parameters), number(keyword, word()));
+    else fail("'" + keyword + "' is unknown; it can be " + list(keywords));
   }
   if (wet && dry) fail("capillary_model is for the cohesion bridge");
   if (wet) options_.cohesion = dembark::CohesionLaw::bridge;

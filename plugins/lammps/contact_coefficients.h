@@ -66,7 +66,7 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
   bool holds() const { return dembark::Cohesion{options_.cohesion}.holds(); }
   dembark::HistoryLayout layout() const {
     return {holds(), options_.presliding == dembark::Presliding::partial_slip,
-            options_.rolling_model == dembark::RollingModel::elastic_plastic, options_.carried_liquid};
+            options_.rolling_resistance == dembark::RollingModel::elastic_plastic, options_.carried_liquid};
   }
 };
 

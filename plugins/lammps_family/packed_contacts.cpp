@@ -26,17 +26,7 @@ dembark::PairStep PackedContacts::describe(const LAMMPS_NS::NeighList& list, int
   keeps_bridges_ = keeps_bridges;
   packed_laws_.assign(std::size_t(types + 1) * std::size_t(types + 1), {});
   for (int i = 1; i <= types; ++i)
-    for (int j = 1; j <= types; ++j) {
-      const ContactParameters& p = law(i, j);
-      packed_laws_[std::size_t(i * (types + 1) + j)] = {p.elasticity.effective_youngs_modulus,
-                                                        p.elasticity.effective_shear_modulus,
-                                                        p.elasticity.damping,
-                                                        p.friction.static_friction,
-                                                        p.friction.kinetic_friction,
-                                                        p.friction.interface_shear_strength,
-                                                        dembark::kept_slip(p.friction, dt),
-                                                        p.friction.critical_slip_distance};
-    }
+    for (int j = 1; j <= types; ++j) packed_laws_[std::size_t(i * (types + 1) + j)] = packed_coefficients(law(i, j), dt);
   const ContactParameters& any = law(1, 1);
   dembark::PairStep step{*this};
   step.memory = this;
@@ -55,8 +45,8 @@ dembark::PairStep PackedContacts::describe(const LAMMPS_NS::NeighList& list, int
   step.limit_force = any.limit_force;
   step.tangential_damping = any.tangential_damping;
   step.elastic_limit = any.friction.friction_limit == dembark::FrictionLimit::elastic;
-  // The scalar law knows that curve, and steps of zero length.
-  step.pack_friction = any.friction.presliding != dembark::Presliding::exponential && dt > 0.0;
+  // Steps of zero length are for the scalar law, too.
+  step.pack_friction = packs_know(any.friction) && dt > 0.0;
   step.rolls = any.rolling.model != dembark::RollingModel::off;
   step.x = atom_->x[0];
   step.v = atom_->v[0];

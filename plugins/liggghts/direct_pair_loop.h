@@ -119,11 +119,13 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     int adhesion = 0;
     for (int k = 0; k + 1 < count; k += 2) {
       const std::string word = words[k], value = words[k + 1];
+      bool chosen = false;
+      each_choice(options_, [&](const char* name, const char*, auto& option, const auto& values, const char*) {
+        if (word == name) chosen = dembark::option_from_name(values, value, option);
+      });
+      if (chosen) continue;
       if (word == "limitForce") options_.limit_force = value == "on";
       else if (word == "tangential_damping") options_.tangential_damping = value == "on";
-      else if (word == "presliding") dembark::option_from_name(dembark::presliding_names(), value, options_.presliding);
-      else if (word == "friction_limit") dembark::option_from_name(dembark::friction_limit_names(), value, options_.friction_limit);
-      else if (word == "rolling_resistance") dembark::option_from_name(dembark::rolling_names(), value, options_.rolling_model);
       else if (word == "carried_liquid") options_.carried_liquid = value == "on";
       else if (word == "capillary_model") dembark::capillary::model_from_name(words[k + 1], options_.capillary_model);
       else if (word == "adhesion_law") {
@@ -142,7 +144,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     dembark_family::HistoryPlaces at;
     at.friction = Stock::get_history_offset(Friction::history_name);
     if (options_.presliding == dembark::Presliding::partial_slip) at.rings = Stock::get_history_offset(Friction::rings_name);
-    if (options_.rolling_model == dembark::RollingModel::elastic_plastic) at.rolling = Stock::get_history_offset(Friction::angle_name);
+    if (options_.rolling_resistance == dembark::RollingModel::elastic_plastic) at.rolling = Stock::get_history_offset(Friction::angle_name);
     if (cohesive && plain_settings_) at.cohesion = Stock::get_history_offset(Attraction::history_name);
     if (at.cohesion >= 0 && options_.carried_liquid) at.imbalance = Stock::get_history_offset(Attraction::imbalance_name);
     liquid_ =
@@ -162,7 +164,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     const auto friction = read_friction(read, options_);
     PairTable<dembark::RollingResistance> rolling;
     PairTable<dembark::Cohesion> cohesion;
-    if (options_.rolling_model != dembark::RollingModel::off) rolling = read_rolling(read, options_);
+    if (options_.rolling_resistance != dembark::RollingModel::off) rolling = read_rolling(read, options_);
     if (cohesive && plain_settings_) cohesion = read_cohesion(read, options_);
     laws_ = PairTable<dembark::ContactParameters>(read.types());
     const dembark::ContactParameters chosen = dembark::chosen_laws(options_);
@@ -173,7 +175,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
         p.elasticity.effective_shear_modulus = shear_modulus[i][j];
         p.elasticity.damping = damping_factor[i][j];
         p.friction = friction(i, j);
-        if (options_.rolling_model != dembark::RollingModel::off) p.rolling = rolling(i, j);
+        if (options_.rolling_resistance != dembark::RollingModel::off) p.rolling = rolling(i, j);
         if (cohesive && plain_settings_) p.cohesion = cohesion(i, j);
       }
   }

@@ -27,28 +27,30 @@
 namespace dembark_liggghts {
 
 /// A keyword with named values, e.g. `presliding linear|exponential`.
-class ChoiceSetting : public EnumSetting<int> {
+template <class Option>
+class ChoiceSetting : public EnumSetting<Option> {
   std::string choices_;
 
  public:
-  ChoiceSetting(const std::string& name, const std::vector<std::string>& values) : EnumSetting<int>(name) {
+  ChoiceSetting(const std::string& name, const std::vector<std::string>& values) : EnumSetting<Option>(name) {
     for (std::size_t i = 0; i < values.size(); ++i) {
-      addOption(values[i], static_cast<int>(i));
+      this->addOption(values[i], static_cast<Option>(i));
       choices_ += (i ? ", " : "") + values[i];
     }
   }
   int parseArguments(char** args) override {
-    const int consumed = EnumSetting<int>::parseArguments(args);
-    if (consumed < 0) error_message = name + " '" + args[1] + "' is unknown; it can be " + choices_;
+    const int consumed = EnumSetting<Option>::parseArguments(args);
+    if (consumed < 0) this->error_message = this->name + " '" + args[1] + "' is unknown; it can be " + choices_;
     return consumed;
   }
 };
 
-/// Register keyword `name`; `target` gets the index of the chosen value, at once that of the default `values[0]`.
-inline void register_choice(Settings& settings, const std::string& name, int& target, const std::vector<std::string>& values) {
+/// Register keyword `name`; `target` gets the chosen value, of which `values` are the names, and at once the first of them.
+template <class Option>
+void register_choice(Settings& settings, const std::string& name, Option& target, const std::vector<std::string>& values) {
   Setting*& slot = keywords(settings)[name];
-  if (!slot) slot = new ChoiceSetting(name, values);
-  ChoiceSetting* setting = static_cast<ChoiceSetting*>(slot);
+  if (!slot) slot = new ChoiceSetting<Option>(name, values);
+  auto* const setting = static_cast<ChoiceSetting<Option>*>(slot);
   setting->registerTarget(target);
   setting->setDefault(values[0]);
 }
@@ -144,7 +146,7 @@ class PropertyReader {
            std::to_string(i) + "; the table of a pair property has to be symmetric");
     return value;
   }
-  static std::string name(const dembark::Parameter& p) { return p.liggghts ? p.liggghts : dembark::camel_case(p.name); }
+  static std::string name(const dembark::Parameter& p) { return p.liggghts ? p.liggghts : p.camel_case; }
 };
 
 /// The numbers of one pair of types, for dembark::read_friction() and its like.
@@ -175,7 +177,7 @@ auto for_all_pairs(const PropertyReader& read, Law law) {
   return laws;
 }
 
-inline PairTable<dembark::FinnieRabinowicz> read_friction(const PropertyReader& read, const dembark::ContactOptions& options) {
+inline PairTable<dembark::Friction> read_friction(const PropertyReader& read, const dembark::ContactOptions& options) {
   return for_all_pairs(read, [&](const PropertySource& source) { return dembark::read_friction(options, source); });
 }
 

@@ -35,9 +35,9 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   int offset_;
   int rings_ = -1;  // offset, with partial slip
   int angle_ = -1;  // the same of an elastic-plastic rolling spring
-  int presliding_ = 0, friction_limit_ = 0, rolling_model_ = 0;
+  dembark::ContactOptions options_;
   dembark_liggghts::StockSums sums_;
-  dembark_liggghts::PairTable<dembark::FinnieRabinowicz> laws_;
+  dembark_liggghts::PairTable<dembark::Friction> laws_;
   dembark_liggghts::PairTable<dembark::RollingResistance> rolling_;
   LAMMPS_NS::PairGran* const pair_;  // nullptr: these are contacts with a wall
   LAMMPS_NS::FixWallGran* const wall_;
@@ -63,19 +63,19 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   }
 
   void registerSettings(Settings& settings) {
-    dembark_liggghts::register_choice(settings, "presliding", presliding_, dembark::presliding_names());
-    dembark_liggghts::register_choice(settings, "friction_limit", friction_limit_, dembark::friction_limit_names());
-    dembark_liggghts::register_choice(settings, "rolling_resistance", rolling_model_, dembark::rolling_names());
+    each_choice(options_, [&](const char* name, const char*, auto& option, const auto& values, const char*) {
+      dembark_liggghts::register_choice(settings, name, option, values);
+    });
     sums_.register_in(settings, true);
   }
 
   inline void postSettings(IContactHistorySetup* host, ContactModelBase* models) {
     sums_.refuse(error, "tangential finnie_rabinowicz", true);
-    if (static_cast<dembark::Presliding>(presliding_) == dembark::Presliding::partial_slip) {
+    if (options_.presliding == dembark::Presliding::partial_slip) {
       rings_ = dembark_liggghts::add_rings(*host);
       models->add_history_offset(rings_name, rings_);
     }
-    if (rolling_model() != dembark::RollingModel::elastic_plastic) return;
+    if (options_.rolling_resistance != dembark::RollingModel::elastic_plastic) return;
     angle_ = host->add_history_value("rolling_angle_x", "1");
     host->add_history_value("rolling_angle_y", "1");
     host->add_history_value("rolling_angle_z", "1");
@@ -84,15 +84,11 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   void connectToProperties(PropertyRegistry& registry) {
     const dembark_liggghts::PropertyReader read(registry, modify, error, "tangential finnie_rabinowicz");
-    dembark::ContactOptions options;
-    options.presliding = static_cast<dembark::Presliding>(presliding_);
-    options.friction_limit = static_cast<dembark::FrictionLimit>(friction_limit_);
-    options.rolling_model = rolling_model();
-    laws_ = dembark_liggghts::read_friction(read, options);
-    if (rolling_model() != dembark::RollingModel::off) {
+    laws_ = dembark_liggghts::read_friction(read, options_);
+    if (options_.rolling_resistance != dembark::RollingModel::off) {
       if (!matches("rolling_friction", "off"))
         read.fail("rolling_resistance and the model rolling_friction are both on; leave one of them out");
-      rolling_ = dembark_liggghts::read_rolling(read, options);
+      rolling_ = dembark_liggghts::read_rolling(read, options_);
     }
     tally_ = dembark_liggghts::find_energy_tally(modify);
     exponent_ = matches("normal", "hertz") ? 1.5 : 1.0;
@@ -112,7 +108,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     state.friction = dembark_liggghts::load_friction(d.contact_history + offset_);
     if (rings_ >= 0) state.rings = dembark_liggghts::load_rings(d.contact_history + rings_);
     if (angle_ >= 0) state.rolling_angle = vector(d.contact_history + angle_);
-    const bool rolls = rolling_model() != dembark::RollingModel::off && rolling_(d.itype, d.jtype).on();
+    const bool rolls = options_.rolling_resistance != dembark::RollingModel::off && rolling_(d.itype, d.jtype).on();
     const dembark::RollingResistance resistance = rolls ? rolling_(d.itype, d.jtype) : dembark::RollingResistance{};
     const double inertia = !rolls      ? 0.0
                            : d.is_wall ? dembark::relative_inertia(d.mi, d.radi, INFINITY, INFINITY)
@@ -150,8 +146,6 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
   inline void endPass(SurfacesIntersectData&, ForceData&, ForceData&) {}
 
  private:
-  dembark::RollingModel rolling_model() const { return static_cast<dembark::RollingModel>(rolling_model_); }
-
   bool matches(const char* kind, const char* model) const {
     return wall_ ? wall_->contact_match(kind, model) : pair_->contact_match(kind, model);
   }

@@ -35,13 +35,19 @@ bool option_from_name(const std::vector<std::string>& names, const std::string& 
   return found != names.end();
 }
 
+/// The friction of a contact. A second law makes this a structure of all, with the choice among them.
+typedef FinnieRabinowicz Friction;
+
+/// Whether packs compute this friction; they leave any other to contact_friction(), contact by contact.
+DEMBARK_FUNCTION inline bool packs_know(const Friction& friction) { return friction.presliding != Presliding::exponential; }
+
 struct ContactParameters {
   NormalLaw normal_law = NormalLaw::hertz;
   HertzParameters elasticity{};          ///< E*, G* (Hertz only) and damping
   double characteristic_velocity = 1.0;  ///< m/s, Hooke only
   bool tangential_damping = true;
   bool limit_force = false;  ///< no attraction by damping: F >= 0
-  FinnieRabinowicz friction{};
+  Friction friction{};
   Cohesion cohesion{};
   RollingResistance rolling{};
 
@@ -111,7 +117,7 @@ DEMBARK_FUNCTION inline RelativeMotion relative_motion(const ContactBodies& b, c
 
 /// Friction of touching surfaces (N, on body 1): the spring turns with the pair by `twist` (rad, of contact_twist), then it sticks or
 /// slips. `rings`: for Presliding::partial_slip, else not used.
-DEMBARK_FUNCTION inline Vec3<double> contact_friction(const FinnieRabinowicz& law, const Vec3<double>& normal, double twist,
+DEMBARK_FUNCTION inline Vec3<double> contact_friction(const Friction& law, const Vec3<double>& normal, double twist,
                                                       const NormalResponse<double>& response, const Vec3<double>& velocity, double dt,
                                                       FrictionState<double>& state, SlipRings* rings) {
   const double limiting = response.limiting_force(law.friction_limit == FrictionLimit::elastic);
@@ -149,7 +155,7 @@ DEMBARK_FUNCTION inline void add_couple(const Vec3<double>& couple, ContactForce
 
 /// The laws of one contact along its surfaces, for surface_forces().
 struct SurfaceLaws {
-  const FinnieRabinowicz& friction_law;
+  const Friction& friction_law;
   const RollingResistance& resistance;
   double effective_radius, inertia;  ///< m; kg m^2, of the relative spin, used by rolling resistance only
   double dt;                         ///< s

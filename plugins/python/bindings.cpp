@@ -9,6 +9,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "dembark/capillary/bridge_law.hpp"
@@ -60,6 +61,33 @@ void complete_for(capillary::BridgeLaw& law, double radius_1, double radius_2) {
 Vec3<double> vector(const nb::tuple& t) { return {nb::cast<double>(t[0]), nb::cast<double>(t[1]), nb::cast<double>(t[2])}; }
 nb::tuple tuple(const Vec3<double>& v) { return nb::make_tuple(v.x, v.y, v.z); }
 
+/// What a script gives to a law by the names of the table of parameters: numbers, and words for choices.
+class Given : public ContactSource {
+  nb::dict given_;
+
+ public:
+  ContactOptions options;
+
+  explicit Given(nb::dict given) : given_(std::move(given)) {
+    for (const auto [name, value] : given_) {
+      const std::string key = nb::cast<std::string>(name);
+      bool known = parameter(key);
+      each_choice(options, [&](const char* choice, const char*, auto& option, const auto& values, const char*) {
+        if (key != choice) return;
+        known = true;
+        std::string word;
+        if (!nb::try_cast(value, word)) throw nb::type_error((key + " must be a word").c_str());
+        option = option_of<std::decay_t<decltype(option)>>(key, values, word);
+      });
+      if (!known) throw std::invalid_argument("a contact has no parameter '" + key + "'");
+    }
+  }
+  std::string name(const Parameter& p) const override { return p.name; }
+  double given(const Parameter& p, int) const override { return given_.contains(p.name) ? nb::cast<double>(given_[p.name]) : NAN; }
+  [[noreturn]] void missing(const Parameter& p, int) const override { throw std::invalid_argument(std::string(p.name) + " is missing"); }
+  [[noreturn]] void wrong(const std::string& line) const override { throw std::invalid_argument(line); }
+};
+
 /// Bridge law and contact parameters with the lifetime of the Python object that uses them.
 struct Contact {
   ContactParameters parameters;
@@ -93,8 +121,8 @@ NB_MODULE(_physics, m) {
     for (const Parameter& p : contact_parameters) {
       nb::dict row;
       row["name"] = p.name;
-      row["camel_case"] = camel_case(p.name);
-      row["liggghts"] = p.liggghts ? std::string(p.liggghts) : camel_case(p.name);
+      row["camel_case"] = p.camel_case;
+      row["liggghts"] = p.liggghts ? p.liggghts : p.camel_case;
       row["unit"] = p.unit;
       row["low"] = p.low;
       row["low_open"] = p.above_low;
@@ -106,6 +134,19 @@ NB_MODULE(_physics, m) {
       row["doc"] = p.doc;
       all.append(row);
     }
+    return all;
+  });
+  m.def("contact_choices", [] {
+    nb::list all;
+    ContactOptions options;
+    each_choice(options, [&](const char* name, const char* camel, auto&, const auto& values, const char* doc) {
+      nb::dict row;
+      row["name"] = name;
+      row["camel_case"] = camel;
+      row["values"] = values;
+      row["doc"] = doc;
+      all.append(row);
+    });
     return all;
   });
   m.def("jkr_contact_radius", &jkr_contact_radius);
@@ -149,48 +190,40 @@ NB_MODULE(_physics, m) {
   m.def("effective_youngs_modulus", &effective_youngs_modulus);
   m.def("effective_shear_modulus", &effective_shear_modulus);
 
-  nb::class_<FinnieRabinowicz>(m, "FinnieRabinowicz")
+  nb::class_<Friction>(m, "Friction")
       .def("__init__",
-           [](FinnieRabinowicz* self, double static_friction, double kinetic_friction, double critical_slip_distance,
-              double interface_shear_strength, double healing_time, const std::string& presliding, const std::string& friction_limit) {
-             const FinnieRabinowicz law{static_friction,
-                                        kinetic_friction,
-                                        critical_slip_distance,
-                                        interface_shear_strength,
-                                        healing_time,
-                                        option_of<Presliding>("presliding", presliding_names(), presliding),
-                                        option_of<FrictionLimit>("friction_limit", friction_limit_names(), friction_limit)};
-             if (law.error()) throw std::invalid_argument(law.error());
-             new (self) FinnieRabinowicz(law);
+           [](Friction* self, const nb::dict& numbers_and_words) {
+             const Given given(numbers_and_words);
+             new (self) Friction(read_friction(given.options, given));
            })
-      .def("friction_coefficient", [](const FinnieRabinowicz& law, double slip) { return friction_coefficient(law, slip); })
-      .def("shear_limit", [](const FinnieRabinowicz& law, double mu, double normal_force,
-                             double area) { return shear_limit(law, mu, normal_force, area); })
-      .def("drive", [](const FinnieRabinowicz& law, Array normal_force, Array stiffness, Array area, Points path, Array time_step,
-                       const nb::tuple& plane) {
-        const std::size_t n = path.shape(0);
-        double* force = new double[3 * n];
-        Vectors forces(force, {n, 3}, nb::capsule(force, [](void* p) noexcept { delete[] static_cast<double*>(p); }));
-        double *slip, *dissipated;
-        Result slips = make_result(n, slip), energies = make_result(n, dissipated);
-        FrictionState<double> state;
-        SlipRings rings;
-        const Vec3<double> normal = vector(plane);
-        Vec3<double> last{};
-        for (std::size_t i = 0; i < n; ++i) {
-          const Vec3<double> here{path(i, 0), path(i, 1), path(i, 2)};
-          const double dt = time_step(i);
-          const NormalResponse<double> response{normal_force(i), stiffness(i), 0.0, area(i), 0.0, normal_force(i)};
-          const Vec3<double> t = contact_friction(law, normal, 0.0, response, (here - last) * (1.0 / dt), dt, state, &rings);
-          last = here;
-          force[3 * i] = -t.x;
-          force[3 * i + 1] = -t.y;
-          force[3 * i + 2] = -t.z;
-          slip[i] = state.slip;
-          dissipated[i] = state.dissipated_energy;
-        }
-        return nb::make_tuple(forces, slips, energies);
-      });
+      .def("friction_coefficient", [](const Friction& law, double slip) { return friction_coefficient(law, slip); })
+      .def("shear_limit",
+           [](const Friction& law, double mu, double normal_force, double area) { return shear_limit(law, mu, normal_force, area); })
+      .def("drive",
+           [](const Friction& law, Array normal_force, Array stiffness, Array area, Points path, Array time_step, const nb::tuple& plane) {
+             const std::size_t n = path.shape(0);
+             double* force = new double[3 * n];
+             Vectors forces(force, {n, 3}, nb::capsule(force, [](void* p) noexcept { delete[] static_cast<double*>(p); }));
+             double *slip, *dissipated;
+             Result slips = make_result(n, slip), energies = make_result(n, dissipated);
+             FrictionState<double> state;
+             SlipRings rings;
+             const Vec3<double> normal = vector(plane);
+             Vec3<double> last{};
+             for (std::size_t i = 0; i < n; ++i) {
+               const Vec3<double> here{path(i, 0), path(i, 1), path(i, 2)};
+               const double dt = time_step(i);
+               const NormalResponse<double> response{normal_force(i), stiffness(i), 0.0, area(i), 0.0, normal_force(i)};
+               const Vec3<double> t = contact_friction(law, normal, 0.0, response, (here - last) * (1.0 / dt), dt, state, &rings);
+               last = here;
+               force[3 * i] = -t.x;
+               force[3 * i + 1] = -t.y;
+               force[3 * i + 2] = -t.z;
+               slip[i] = state.slip;
+               dissipated[i] = state.dissipated_energy;
+             }
+             return nb::make_tuple(forces, slips, energies);
+           });
 
   nb::class_<RollingResistance>(m, "RollingResistance")
       .def("__init__", [](RollingResistance* self, const std::string& model, double friction, double damping_ratio) {
@@ -201,7 +234,7 @@ NB_MODULE(_physics, m) {
   nb::class_<Contact>(m, "Contact")
       .def("__init__",
            [](Contact* self, const std::string& normal_law, double youngs, double shear, double restitution, double characteristic_velocity,
-              bool tangential_damping, bool limit_force, const FinnieRabinowicz& friction, const RollingResistance& rolling,
+              bool tangential_damping, bool limit_force, const Friction& friction, const RollingResistance& rolling,
               const std::string& cohesion, double cohesive_force, double work_of_adhesion, const std::string& capillary_model,
               double contact_angle, double surface_tension, double bridge_volume, double viscosity, double minimum_gap) {
              new (self) Contact{{option_of<NormalLaw>("normal law", normal_law_names(), normal_law),

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <core/Omega.hpp>
@@ -76,23 +77,18 @@ struct Number {
 	Real Ip2::* ofAll;
 	Real Phys::* kept;
 };
+// clang-format off
+#define DEMBARK_NUMBER(scope, name, camel, ...) DEMBARK_NUMBER_##scope(name, camel)
+#define DEMBARK_NUMBER_pair(name, camel) {ContactNumber::name, &Ip2::camel, nullptr, &Phys::camel},
+#define DEMBARK_NUMBER_global(name, camel) {ContactNumber::name, nullptr, &Ip2::camel, &Phys::camel},
 const Number numbers[] = {
-	{ContactNumber::restitution, &Ip2::restitution, nullptr, &Phys::restitution},
-	{ContactNumber::static_friction, &Ip2::staticFriction, nullptr, &Phys::staticFriction},
-	{ContactNumber::kinetic_friction, &Ip2::kineticFriction, nullptr, &Phys::kineticFriction},
-	{ContactNumber::critical_slip_distance, &Ip2::criticalSlipDistance, nullptr, &Phys::criticalSlipDistance},
-	{ContactNumber::interface_shear_strength, &Ip2::interfaceShearStrength, nullptr, &Phys::interfaceShearStrength},
-	{ContactNumber::rolling_friction, &Ip2::rollingFriction, nullptr, &Phys::rollingFriction},
-	{ContactNumber::rolling_damping_ratio, &Ip2::rollingDampingRatio, nullptr, &Phys::rollingDampingRatio},
 	{ContactNumber::bridge_volume, &Ip2::bridgeVolume, nullptr, &Phys::newBridgeVolume},
-	{ContactNumber::contact_angle, &Ip2::contactAngle, nullptr, &Phys::contactAngle},
-	{ContactNumber::cohesive_force, &Ip2::cohesiveForce, nullptr, &Phys::cohesiveForce},
-	{ContactNumber::work_of_adhesion, &Ip2::workOfAdhesion, nullptr, &Phys::workOfAdhesion},
-	{ContactNumber::surface_tension, nullptr, &Ip2::surfaceTension, &Phys::surfaceTension},
-	{ContactNumber::liquid_viscosity, nullptr, &Ip2::liquidViscosity, &Phys::liquidViscosity},
-	{ContactNumber::minimum_gap, nullptr, &Ip2::minimumGap, &Phys::minimumGap},
-	{ContactNumber::healing_time, nullptr, &Ip2::healingTime, &Phys::healingTime},
+	DEMBARK_CONTACT_NUMBERS(DEMBARK_NUMBER)
 };
+#undef DEMBARK_NUMBER
+#undef DEMBARK_NUMBER_pair
+#undef DEMBARK_NUMBER_global
+// clang-format on
 
 /// The numbers that a contact of two materials, or bodies, keeps, for dembark::read_friction() and its like. All are >= 0; below is: not
 /// given.
@@ -104,7 +100,7 @@ class PhysSource : public ::dembark::ContactSource {
 
 public:
 	PhysSource(const Phys& contact, const Pair& one, const Pair& other) : phys(contact), a(one), b(other) {}
-	std::string name(const ::dembark::Parameter& p) const override { return ::dembark::camel_case(p.name); }
+	std::string name(const ::dembark::Parameter& p) const override { return p.camel_case; }
 	double      given(const ::dembark::Parameter& p, int) const override {
 		for (const Number& each : numbers)
 			if (&parameter(each.which) == &p) return phys.*each.kept >= 0.0 ? phys.*each.kept : NaN;
@@ -129,6 +125,12 @@ void choose(const char* attribute, const std::string& word, const std::vector<st
 
 namespace dembark_yade {
 
+std::string listed(const std::string& doc, const std::vector<std::string>& names) {
+	std::string text = doc;
+	for (std::size_t k = 0; k < names.size(); ++k) text += (k == 0 ? ": '" : k + 1 < names.size() ? "', '" : "' or '") + names[k];
+	return text + "'";
+}
+
 void refuseForce(const Scene& scene, Body::id_t id1, Body::id_t id2) {
 	fail("the contact of bodies " + std::to_string(id1) + " and " + std::to_string(id2) + " has no finite force in step " +
 	             std::to_string(scene.iter) + "; look at their positions, velocities and parameters, and at the time step",
@@ -136,8 +138,8 @@ void refuseForce(const Scene& scene, Body::id_t id1, Body::id_t id2) {
 }
 
 int LawKinds::of(const ::dembark::ContactParameters& p) {
-	if (p.normal_law != ::dembark::NormalLaw::hertz || p.friction.presliding != ::dembark::Presliding::linear || p.rolling.on() ||
-	    p.cohesion.liquid.viscous.on())
+	if (p.normal_law != ::dembark::NormalLaw::hertz || !packs_know(p.friction) ||
+	    p.friction.presliding == ::dembark::Presliding::partial_slip || p.rolling.on() || p.cohesion.liquid.viscous.on())
 		return -1;
 	constexpr std::size_t most    = 64;
 	const auto            numbers = [](const ::dembark::HertzParameters& e, const ::dembark::FinnieRabinowicz& f) {
@@ -162,12 +164,7 @@ void LawKinds::clear() {
 std::vector<::dembark::PackedCoefficients<double>> LawKinds::laws(double dt) {
 	const std::lock_guard<std::mutex>                  lock(guard);
 	std::vector<::dembark::PackedCoefficients<double>> all;
-	for (const Kind& kind : kinds) {
-		const ::dembark::FinnieRabinowicz& f = kind.friction;
-		all.push_back({kind.elasticity.effective_youngs_modulus, kind.elasticity.effective_shear_modulus, kind.elasticity.damping,
-		               f.static_friction, f.kinetic_friction, f.interface_shear_strength, kept_slip(f, dt),
-		               f.critical_slip_distance});
-	}
+	for (const Kind& kind : kinds) all.push_back(packed_coefficients(kind, dt));
 	return all;
 }
 
@@ -198,6 +195,11 @@ void Phys::setState(const ::dembark::ContactState& now) {
 	if (contact.friction.presliding != ::dembark::Presliding::partial_slip) return;
 	slipRings.resize(ringNumbers);
 	std::memcpy(slipRings.data(), &now.rings, sizeof now.rings);
+}
+
+void Ip2::postLoad(Ip2&) {
+	const decltype(friction) now{staticFriction, kineticFriction};
+	if (std::exchange(friction, now) != now) frictionAngles.clear();
 }
 
 /// Refuses what of a material the law would disregard in silence.
@@ -232,11 +234,11 @@ void Ip2::go(const shared_ptr<Material>& material1, const shared_ptr<Material>& 
 	phys->effectiveShearModulus  = ::dembark::effective_shear_modulus(a.young, a.poisson, b.young, b.poisson);
 	for (const Number& each : numbers) {
 		const ::dembark::Parameter& p     = parameter(each.which);
-		const std::string           name  = ::dembark::camel_case(p.name);
+		const std::string           name  = p.camel_case;
 		Real                        value = each.ofPair ? pairValue(this->*each.ofPair, ip2 + name, a, b) : this->*each.ofAll;
 		// A viscosity of 0 needs no gap.
 		const bool noGap   = each.which == ContactNumber::minimum_gap && value == 0.0;
-		const bool missing = std::isnan(value) && (each.ofPair || each.which == ContactNumber::surface_tension);
+		const bool missing = std::isnan(value) && (each.ofPair || p.required());
 		if (missing || noGap) {
 			if (each.which == ContactNumber::restitution) fail(ip2 + name + " is not set; give it a number or a MatchMaker");
 			// Without a volume materials are dry.
@@ -265,9 +267,9 @@ void Law2::postLoad(Law2&) {
 	int                       chosen = 0;
 	::dembark::ContactOptions now;
 	choose("normalLaw", normalLaw, ::dembark::normal_law_names(), now.normal_law);
-	choose("presliding", presliding, ::dembark::presliding_names(), now.presliding);
-	choose("frictionLimit", frictionLimit, ::dembark::friction_limit_names(), now.friction_limit);
-	choose("rollingResistance", rollingResistance, ::dembark::rolling_names(), now.rolling_model);
+#define DEMBARK_CHOOSE(name, camel, type, first, names, doc) choose(#camel, camel, ::dembark::names(), now.name);
+	DEMBARK_CONTACT_CHOICES(DEMBARK_CHOOSE)
+#undef DEMBARK_CHOOSE
 	choose("cohesion", cohesion, ::dembark::cohesion_names(), now.cohesion);
 	choose("capillaryModel", capillaryModel, models, chosen);
 	const bool dry = now.cohesion != ::dembark::CohesionLaw::none && now.cohesion != ::dembark::CohesionLaw::bridge;

@@ -2,6 +2,7 @@
 // pair of materials, and the law. The formulas are those of dembark/contact.hpp; here only YADE's conventions are mapped to them.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <mutex>
 
@@ -21,11 +22,28 @@
 #include "dembark/parameters/contact_parameters.hpp"
 #include "dembark/pairs/pair_step.hpp"
 
+// Attributes by the table of parameters, from the lists of dembark/parameters/contact_parameters.hpp. YADE's macro appends a text to each
+// description, hence the plus.
+// clang-format off
+#define DEMBARK_KEPT_NUMBER(scope, name, camel, ...) \
+	((Real,camel,-1,Attr::triggerPostLoad,description(parameter(::dembark::ContactNumber::name))+))
+#define DEMBARK_GIVEN_NUMBER(scope, ...) DEMBARK_GIVEN_NUMBER_##scope(__VA_ARGS__)
+#define DEMBARK_GIVEN_NUMBER_pair(name, camel, ...) \
+	((shared_ptr<MatchMaker>,camel,,Attr::triggerPostLoad,description(parameter(::dembark::ContactNumber::name))+))
+#define DEMBARK_GIVEN_NUMBER_global(name, camel, unit, low, above, high, infinite, otherwise, ...) \
+	((Real,camel,::dembark::parameter(::dembark::ContactNumber::name).otherwise,,description(parameter(::dembark::ContactNumber::name))+))
+#define DEMBARK_CHOICE(name, camel, type, first, names, doc) \
+	((string,camel,#first,Attr::triggerPostLoad,dembark_yade::listed(doc,::dembark::names())+))
+// clang-format on
+
 namespace yade {
 
 namespace dembark_yade {
 
 struct ContactView;
+
+/// "doc: 'a', 'b' or 'c'".
+std::string listed(const std::string& doc, const std::vector<std::string>& names);
 
 /// Ends the run: the contact of these bodies has no finite force.
 [[noreturn]] void refuseForce(const Scene&, Body::id_t, Body::id_t);
@@ -42,8 +60,8 @@ public:
 
 private:
 	struct Kind {
-		::dembark::HertzParameters  elasticity;
-		::dembark::FinnieRabinowicz friction;
+		::dembark::HertzParameters elasticity;
+		::dembark::Friction        friction;
 	};
 	std::vector<Kind> kinds;
 	std::mutex        guard;
@@ -94,21 +112,8 @@ public:
 		((Vector3r,rollingTorque,Vector3r::Zero(),Attr::readonly,"Couple [N m] of rolling resistance on body 2"))
 		((Real,effectiveYoungsModulus,0,Attr::triggerPostLoad,"E* [Pa], 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2"))
 		((Real,effectiveShearModulus,0,Attr::triggerPostLoad,"G* [Pa], 1/G* = (2-nu1)/G1 + (2-nu2)/G2"))
-		((Real,restitution,1,Attr::triggerPostLoad,"Coefficient of restitution"))
-		((Real,staticFriction,0,Attr::triggerPostLoad,"Static friction coefficient"))
-		((Real,kineticFriction,0,Attr::triggerPostLoad,"Kinetic friction coefficient"))
-		((Real,criticalSlipDistance,0,Attr::triggerPostLoad,"Slip [m] over which friction falls from its static to its kinetic value"))
-		((Real,interfaceShearStrength,1e30,Attr::triggerPostLoad,"Shear strength [Pa] of the interface; 1e30 or more = unlimited"))
-		((Real,healingTime,0,Attr::triggerPostLoad,"Time constant [s] in which slip is forgotten while the contact sticks; 0 = at once"))
-		((Real,rollingFriction,-1,Attr::triggerPostLoad,"Coefficient of rolling resistance; -1, here and below: not given"))
-		((Real,rollingDampingRatio,-1,Attr::triggerPostLoad,"Damping ratio of the rolling spring"))
-		((Real,newBridgeVolume,0,Attr::triggerPostLoad,"Volume [m^3] of a bridge that forms when the bodies touch"))
-		((Real,surfaceTension,-1,Attr::triggerPostLoad,"Surface tension [N/m]"))
-		((Real,contactAngle,-1,Attr::triggerPostLoad,"Contact angle [rad]"))
-		((Real,liquidViscosity,0,Attr::triggerPostLoad,"Viscosity [Pa s] of the liquid; 0 = no viscous force"))
-		((Real,minimumGap,-1,Attr::triggerPostLoad,"Gap [m] below which viscous forces do not grow"))
-		((Real,cohesiveForce,-1,Attr::triggerPostLoad,"Attraction [N] of touching surfaces"))
-		((Real,workOfAdhesion,-1,Attr::triggerPostLoad,"Work of adhesion [J/m^2]")),
+		((Real,newBridgeVolume,0,Attr::triggerPostLoad,"Volume [m^3] of a bridge that forms when the bodies touch; the numbers from here on are those of the Ip2 functor, -1: not given"))
+		DEMBARK_CONTACT_NUMBERS(DEMBARK_KEPT_NUMBER),
 		createIndex();
 		, /*py*/
 		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
@@ -128,25 +133,12 @@ REGISTER_SERIALIZABLE(FinnieRabinowiczPhys);
 class Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys : public IPhysFunctor {
 public:
 	void go(const shared_ptr<Material>&, const shared_ptr<Material>&, const shared_ptr<Interaction>&) override;
-	void postLoad(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys&) { frictionAngles.clear(); }
+	void postLoad(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys&);
 	FUNCTOR2D(FrictMat, FrictMat);
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys,IPhysFunctor,"Creates :yref:`FinnieRabinowiczPhys`. Elastic constants come from the materials; :yref:`FrictMat.frictionAngle` is not used, and must not change while the scene runs; materials of a derived class, whose further attributes would do nothing, are refused. All pair parameters are :yref:`MatchMaker` objects by material id and may be given as plain numbers.",
-		((shared_ptr<MatchMaker>,restitution,,,"Coefficient of restitution, > 0 and <= 1. Required."))
-		((shared_ptr<MatchMaker>,staticFriction,,Attr::triggerPostLoad,"Static friction coefficient, >= 0. Required."))
-		((shared_ptr<MatchMaker>,kineticFriction,,Attr::triggerPostLoad,"Kinetic friction coefficient, >= 0 and not above the static one. Required."))
-		((shared_ptr<MatchMaker>,criticalSlipDistance,,,"Slip [m] over which friction falls from its static to its kinetic value, >= 0. Required."))
-		((shared_ptr<MatchMaker>,interfaceShearStrength,,,"Shear strength [Pa] of the interface, > 0; not given, or 1e30 and more = unlimited."))
-		((shared_ptr<MatchMaker>,rollingFriction,,,"Coefficient of rolling resistance, >= 0: the largest couple over the normal force and the effective radius. Required with a :yref:`rollingResistance<Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz.rollingResistance>`."))
-		((shared_ptr<MatchMaker>,rollingDampingRatio,,,"Damping ratio, >= 0, of the spring of 'elastic_plastic'; not given = 0."))
-		((shared_ptr<MatchMaker>,bridgeVolume,,,"Volume [m^3] of each liquid bridge, formed when two bodies touch; not given or 0 = dry."))
-		((shared_ptr<MatchMaker>,contactAngle,,,"Contact angle [rad], 0...pi/2. Required with a bridge volume, and with carried liquid."))
-		((Real,surfaceTension,NaN,,"Surface tension [N/m], >= 0. Required with a bridge volume, and with carried liquid."))
-		((Real,liquidViscosity,0,,"Viscosity [Pa s] of the liquid, >= 0; 0 = no viscous force."))
-		((Real,minimumGap,0,,"Gap [m], > 0, below which viscous forces do not grow: the roughness of the surfaces. Required with a viscosity."))
-		((shared_ptr<MatchMaker>,cohesiveForce,,,"Attraction [N] of touching surfaces, >= 0. Required with the cohesion 'constant'."))
-		((shared_ptr<MatchMaker>,workOfAdhesion,,,"Work of adhesion [J/m^2], >= 0, twice the surface energy of equal materials. Required with the cohesion 'dmt' or 'jkr'."))
-		((Real,healingTime,0,,"Time constant [s] in which slip is forgotten while a contact sticks; 0 = at once."))
+		((shared_ptr<MatchMaker>,bridgeVolume,,Attr::triggerPostLoad,"Volume [m^3] of each liquid bridge, formed when two bodies touch; not given or 0 = dry."))
+		DEMBARK_CONTACT_NUMBERS(DEMBARK_GIVEN_NUMBER)
 		, /*ctor*/
 		, /*py*/
 		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
@@ -157,7 +149,8 @@ private:
 	void check(const FrictMat&);
 
 	std::vector<Real> frictionAngles;  // of each material by id when it was first seen since friction was set; NaN: not yet
-	std::mutex        guard;
+	std::array<shared_ptr<MatchMaker>, 2> friction;  // as it was set then
+	std::mutex                            guard;
 };
 REGISTER_SERIALIZABLE(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys);
 
@@ -177,9 +170,7 @@ public:
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz,LawFunctor,"Normal force of Hertz or Hooke with damping from a coefficient of restitution, tangential force of Finnie and Rabinowicz, rolling resistance if wanted, and a liquid bridge with capillary and, if wanted, viscous force. A body whose shape is not a :yref:`Sphere` is a wall of infinite radius and mass; a sphere that is not dynamic has infinite mass; two bodies of which neither is dynamic have no force. A bridge keeps its interaction until it ruptures, at any gap.",
 		((string,normalLaw,"hertz",Attr::triggerPostLoad,"'hertz' or 'hooke'"))
 		((Real,characteristicVelocity,NaN,Attr::triggerPostLoad,"Impact speed [m/s] at which the overlap of 'hooke' equals that of 'hertz'. Required for 'hooke'."))
-		((string,presliding,"linear",Attr::triggerPostLoad,"Tangential force before gross slip: 'linear', 'exponential' or 'partial_slip'"))
-		((string,frictionLimit,"total",Attr::triggerPostLoad,"Normal force that limits friction: 'total', with its damping, or 'elastic', of its spring alone"))
-		((string,rollingResistance,"off",Attr::triggerPostLoad,"Couple against rolling: 'off', 'constant_torque' or 'elastic_plastic'"))
+		DEMBARK_CONTACT_CHOICES(DEMBARK_CHOICE)
 		((string,cohesion,"none",Attr::triggerPostLoad,"Attraction: 'none', 'bridge' (given, too, by a capillaryModel), or of dry surfaces 'constant', 'dmt' or 'jkr'"))
 		((string,capillaryModel,"none",Attr::triggerPostLoad,"'none', or the force law of a bridge: 'exact', 'willett', 'willett_full', 'rabinovich', 'bagheri', 'constant'"))
 		((bool,carriedLiquid,false,Attr::triggerPostLoad,"Bridges take their liquid from the bodies and give it back; needs the engine :yref:`CapillaryLiquid` after the :yref:`InteractionLoop`"))
@@ -214,5 +205,7 @@ REGISTER_SERIALIZABLE(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz);
 
 }  // namespace yade
 
-DEMBARK_SAVED_FORMAT(FinnieRabinowiczPhys, 2)
-DEMBARK_SAVED_FORMAT(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz, 2)
+// Rows of the table of parameters are attributes.
+DEMBARK_SAVED_FORMAT(FinnieRabinowiczPhys, ::dembark::contact_parameter_count)
+DEMBARK_SAVED_FORMAT(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys, ::dembark::contact_parameter_count)
+DEMBARK_SAVED_FORMAT(Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz, ::dembark::contact_choice_count)

@@ -37,6 +37,19 @@ struct PackedCoefficients {
   Real critical_slip_distance;
 };
 
+/// Those of dembark/contact.hpp, for steps of `dt` (s).
+template <class Parameters>
+PackedCoefficients<double> packed_coefficients(const Parameters& p, double dt) {
+  return {p.elasticity.effective_youngs_modulus,
+          p.elasticity.effective_shear_modulus,
+          p.elasticity.damping,
+          p.friction.static_friction,
+          p.friction.kinetic_friction,
+          p.friction.interface_shear_strength,
+          kept_slip(p.friction, dt),
+          p.friction.critical_slip_distance};
+}
+
 /// The pairs in work: those that touch, and those with a contact or a bridge stored, to hold or to end it.
 struct PairBlock {
   static constexpr int capacity = 128, room = capacity + 16;    // some room behind for whole packs

@@ -12,59 +12,64 @@
 
 namespace dembark {
 
+// The rows of the table. A new number is a row at the end of the second list; parsers, attributes and checks follow.
+//   NUMBER(scope, name, in camel case, unit, low, above `low`, high, infinite, default, doc, name in LIGGGHTS): see Parameter
+// clang-format off
+/// Those that YADE has in places of their own: in its materials, in its law, and the volume of a bridge that forms.
+#define DEMBARK_SPECIAL_NUMBERS(NUMBER) \
+  NUMBER(type, youngs_modulus, youngsModulus, "Pa", 0, true, INFINITY, false, no_default, "Young's modulus", nullptr) \
+  NUMBER(type, poissons_ratio, poissonsRatio, "1", -1, true, 0.5, false, no_default, "Poisson's ratio", nullptr) \
+  NUMBER(global, characteristic_velocity, characteristicVelocity, "m/s", 0, true, INFINITY, false, no_default, \
+         "impact speed at which the largest overlap of Hooke's law equals that of Hertz's", nullptr) \
+  NUMBER(pair, bridge_volume, bridgeVolume, "m^3", 0, false, INFINITY, false, no_default, "volume of each liquid bridge", nullptr)
+#define DEMBARK_CONTACT_NUMBERS(NUMBER) \
+  NUMBER(pair, restitution, restitution, "1", 0, true, 1, false, no_default, "coefficient of restitution without adhesion", \
+         "coefficientRestitution") \
+  NUMBER(pair, static_friction, staticFriction, "1", 0, false, INFINITY, false, no_default, "coefficient of static friction", nullptr) \
+  NUMBER(pair, kinetic_friction, kineticFriction, "1", 0, false, INFINITY, false, no_default, \
+         "coefficient of kinetic friction, at most the static one", nullptr) \
+  NUMBER(pair, critical_slip_distance, criticalSlipDistance, "m", 0, false, INFINITY, true, no_default, \
+         "slip over which friction falls from its static to its kinetic value", nullptr) \
+  NUMBER(pair, interface_shear_strength, interfaceShearStrength, "Pa", 0, true, INFINITY, true, unlimited_strength, \
+         "shear strength of the interface; 1e30 or more is unlimited", nullptr) \
+  NUMBER(global, healing_time, healingTime, "s", 0, false, INFINITY, true, 0, \
+         "time constant in which slip is forgotten while a contact sticks; 0 is at once", nullptr) \
+  NUMBER(pair, rolling_friction, rollingFriction, "1", 0, false, INFINITY, false, no_default, "coefficient of rolling resistance", \
+         "coefficientRollingFriction") \
+  NUMBER(pair, rolling_damping_ratio, rollingDampingRatio, "1", 0, false, INFINITY, false, 0, "damping ratio of the rolling spring", \
+         "coefficientRollingViscousDamping") \
+  NUMBER(global, surface_tension, surfaceTension, "N/m", 0, false, INFINITY, false, no_default, "surface tension of the liquid", nullptr) \
+  NUMBER(pair, contact_angle, contactAngle, "rad", 0, false, 1.5707963267948966, false, no_default, "contact angle", nullptr) \
+  NUMBER(global, liquid_viscosity, liquidViscosity, "Pa s", 0, false, INFINITY, false, 0, \
+         "viscosity of the liquid; 0 is without viscous forces", nullptr) \
+  NUMBER(global, minimum_gap, minimumGap, "m", 0, true, INFINITY, false, no_default, \
+         "gap below which viscous forces do not grow, the roughness of the surfaces", nullptr) \
+  NUMBER(pair, cohesive_force, cohesiveForce, "N", 0, false, INFINITY, false, no_default, "attraction of touching surfaces", nullptr) \
+  NUMBER(pair, work_of_adhesion, workOfAdhesion, "J/m^2", 0, false, INFINITY, false, no_default, \
+         "work of adhesion, twice the surface energy of equal materials", nullptr)
+
+/// Choices by a word that all engines parse alike: CHOICE(name, in camel case, type, first, names of its values, doc).
+#define DEMBARK_CONTACT_CHOICES(CHOICE) \
+  CHOICE(presliding, presliding, Presliding, linear, presliding_names, "curve of friction below its limit") \
+  CHOICE(friction_limit, frictionLimit, FrictionLimit, total, friction_limit_names, \
+         "normal force that limits friction, with its damping or of its spring alone") \
+  CHOICE(rolling_resistance, rollingResistance, RollingModel, off, rolling_names, "couple against rolling")
+// clang-format on
+
 /// In the order of contact_parameters.
 enum class ContactNumber {
-  youngs_modulus,
-  poissons_ratio,
-  restitution,
-  characteristic_velocity,
-  static_friction,
-  kinetic_friction,
-  critical_slip_distance,
-  interface_shear_strength,
-  healing_time,
-  rolling_friction,
-  rolling_damping_ratio,
-  surface_tension,
-  contact_angle,
-  bridge_volume,
-  liquid_viscosity,
-  minimum_gap,
-  cohesive_force,
-  work_of_adhesion,
+#define DEMBARK_NAME(scope, name, ...) name,
+  DEMBARK_SPECIAL_NUMBERS(DEMBARK_NAME) DEMBARK_CONTACT_NUMBERS(DEMBARK_NAME)
+#undef DEMBARK_NAME
 };
 
-// clang-format off
 inline constexpr Parameter contact_parameters[] = {
-  {"youngs_modulus", "Pa", 0, true, INFINITY, false, NAN, Scope::type, "Young's modulus", nullptr},
-  {"poissons_ratio", "1", -1, true, 0.5, false, NAN, Scope::type, "Poisson's ratio", nullptr},
-  {"restitution", "1", 0, true, 1, false, NAN, Scope::pair, "coefficient of restitution without adhesion", "coefficientRestitution"},
-  {"characteristic_velocity", "m/s", 0, true, INFINITY, false, NAN, Scope::global,
-   "impact speed at which the largest overlap of Hooke's law equals that of Hertz's", nullptr},
-  {"static_friction", "1", 0, false, INFINITY, false, NAN, Scope::pair, "coefficient of static friction", nullptr},
-  {"kinetic_friction", "1", 0, false, INFINITY, false, NAN, Scope::pair, "coefficient of kinetic friction, at most the static one", nullptr},
-  {"critical_slip_distance", "m", 0, false, INFINITY, true, NAN, Scope::pair,
-   "slip over which friction falls from its static to its kinetic value", nullptr},
-  {"interface_shear_strength", "Pa", 0, true, INFINITY, true, unlimited_strength, Scope::pair,
-   "shear strength of the interface; 1e30 or more is unlimited", nullptr},
-  {"healing_time", "s", 0, false, INFINITY, true, 0, Scope::global, "time constant in which slip is forgotten while a contact sticks; 0 is at once",
-   nullptr},
-  {"rolling_friction", "1", 0, false, INFINITY, false, NAN, Scope::pair, "coefficient of rolling resistance", "coefficientRollingFriction"},
-  {"rolling_damping_ratio", "1", 0, false, INFINITY, false, 0, Scope::pair, "damping ratio of the rolling spring",
-   "coefficientRollingViscousDamping"},
-  {"surface_tension", "N/m", 0, false, INFINITY, false, NAN, Scope::global, "surface tension of the liquid", nullptr},
-  {"contact_angle", "rad", 0, false, 1.5707963267948966, false, NAN, Scope::pair, "contact angle", nullptr},
-  {"bridge_volume", "m^3", 0, false, INFINITY, false, NAN, Scope::pair, "volume of each liquid bridge", nullptr},
-  {"liquid_viscosity", "Pa s", 0, false, INFINITY, false, 0, Scope::global, "viscosity of the liquid; 0 is without viscous forces", nullptr},
-  {"minimum_gap", "m", 0, true, INFINITY, false, NAN, Scope::global, "gap below which viscous forces do not grow, the roughness of the surfaces",
-   nullptr},
-  {"cohesive_force", "N", 0, false, INFINITY, false, NAN, Scope::pair, "attraction of touching surfaces", nullptr},
-  {"work_of_adhesion", "J/m^2", 0, false, INFINITY, false, NAN, Scope::pair, "work of adhesion, twice the surface energy of equal materials",
-   nullptr},
+#define DEMBARK_ROW(scope, name, camel, unit, low, above, high, infinite, otherwise, doc, liggghts) \
+  {#name, #camel, unit, low, above, high, infinite, otherwise, Scope::scope, doc, liggghts},
+    DEMBARK_SPECIAL_NUMBERS(DEMBARK_ROW) DEMBARK_CONTACT_NUMBERS(DEMBARK_ROW)
+#undef DEMBARK_ROW
 };
-// clang-format on
 inline constexpr int contact_parameter_count = sizeof(contact_parameters) / sizeof(Parameter);
-static_assert(contact_parameter_count == static_cast<int>(ContactNumber::work_of_adhesion) + 1);
 
 inline const Parameter& parameter(ContactNumber number) { return contact_parameters[static_cast<int>(number)]; }
 
@@ -78,15 +83,26 @@ inline const Parameter* parameter(const std::string& name) {
 /// The laws of a contact, which users choose by words.
 struct ContactOptions {
   NormalLaw normal_law = NormalLaw::hertz;
-  Presliding presliding = Presliding::linear;
-  FrictionLimit friction_limit = FrictionLimit::total;
-  RollingModel rolling_model = RollingModel::off;
+#define DEMBARK_MEMBER(name, camel, type, first, ...) type name = type::first;
+  DEMBARK_CONTACT_CHOICES(DEMBARK_MEMBER)
+#undef DEMBARK_MEMBER
   CohesionLaw cohesion = CohesionLaw::none;
   capillary::Model capillary_model = capillary::Model::exact;
   bool viscous = false;         ///< bridges resist with the viscosity of their liquid
   bool carried_liquid = false;  ///< bridges take their liquid from the grains
   bool tangential_damping = true, limit_force = false;
 };
+
+/// Calls visit(name, name in camel case, option, names of its values, doc) for each choice.
+template <class Visit>
+void each_choice(ContactOptions& options, Visit visit) {
+#define DEMBARK_VISIT(name, camel, type, first, names, doc) visit(#name, #camel, options.name, names(), doc);
+  DEMBARK_CONTACT_CHOICES(DEMBARK_VISIT)
+#undef DEMBARK_VISIT
+}
+#define DEMBARK_ONE(...) +1
+inline constexpr int contact_choice_count = DEMBARK_CONTACT_CHOICES(DEMBARK_ONE);
+#undef DEMBARK_ONE
 
 /// Where an engine keeps the numbers of a pair of types.
 class ContactSource {
@@ -120,24 +136,24 @@ inline HertzParameters read_elasticity(const ContactSource& source) {
           effective_shear_modulus(youngs[0], poisson[0], youngs[1], poisson[1]), source.number(N::restitution)};
 }
 
-inline FinnieRabinowicz read_friction(const ContactOptions& options, const ContactSource& source) {
+inline Friction read_friction(const ContactOptions& options, const ContactSource& source) {
   typedef ContactNumber N;
-  const FinnieRabinowicz law{source.number(N::static_friction),
-                             source.number(N::kinetic_friction),
-                             source.number(N::critical_slip_distance),
-                             source.number(N::interface_shear_strength),
-                             source.number(N::healing_time),
-                             options.presliding,
-                             options.friction_limit};
+  const Friction law{source.number(N::static_friction),
+                     source.number(N::kinetic_friction),
+                     source.number(N::critical_slip_distance),
+                     source.number(N::interface_shear_strength),
+                     source.number(N::healing_time),
+                     options.presliding,
+                     options.friction_limit};
   if (law.error()) source.wrong(law.error());
   return law;
 }
 
 inline RollingResistance read_rolling(const ContactOptions& options, const ContactSource& source) {
   typedef ContactNumber N;
-  if (options.rolling_model == RollingModel::off) return {};
-  RollingResistance law{options.rolling_model, source.number(N::rolling_friction), 0.0};
-  if (options.rolling_model == RollingModel::elastic_plastic) law.damping_ratio = source.number(N::rolling_damping_ratio);
+  if (options.rolling_resistance == RollingModel::off) return {};
+  RollingResistance law{options.rolling_resistance, source.number(N::rolling_friction), 0.0};
+  if (options.rolling_resistance == RollingModel::elastic_plastic) law.damping_ratio = source.number(N::rolling_damping_ratio);
   return law;
 }
 
@@ -174,7 +190,7 @@ inline ContactParameters chosen_laws(const ContactOptions& options) {
   p.limit_force = options.limit_force;
   p.friction.presliding = options.presliding;
   p.friction.friction_limit = options.friction_limit;
-  p.rolling.model = options.rolling_model;
+  p.rolling.model = options.rolling_resistance;
   p.cohesion.law = options.cohesion;
   return p;
 }

@@ -10,35 +10,27 @@ namespace dembark {
 /// Of what a number is: of the contact law, of a material, or of a pair of materials.
 enum class Scope { global, type, pair };
 
+constexpr double no_default = NAN;  ///< of a number that must be given
+
 // In the order of a row, not of the sizes.
-struct Parameter {   // NOLINT(clang-analyzer-optin.performance.Padding)
-  const char* name;  ///< as LAMMPS and Python write it; LIGGGHTS and YADE write camelCase, see camel_case()
-  const char* unit;  ///< SI; "1" without
-  double low;        ///< smallest value
-  bool above_low;    ///< larger than `low`, not equal to it
-  double high;       ///< largest value; INFINITY: any finite number
-  bool infinite;     ///< infinity is a value, too
-  double otherwise;  ///< where it is not given; NAN: it must be given
+struct Parameter {         // NOLINT(clang-analyzer-optin.performance.Padding)
+  const char* name;        ///< as LAMMPS and Python write it
+  const char* camel_case;  ///< the same as YADE and LIGGGHTS write it
+  const char* unit;        ///< SI; "1" without
+  double low;              ///< smallest value
+  bool above_low;          ///< larger than `low`, not equal to it
+  double high;             ///< largest value; INFINITY: any finite number
+  bool infinite;           ///< infinity is a value, too
+  double otherwise;        ///< where it is not given, or no_default
   Scope scope;
   const char* doc;       ///< one sentence without a full stop
-  const char* liggghts;  ///< its name in LIGGGHTS where that is not camelCase of `name`, else nullptr
+  const char* liggghts;  ///< its name in LIGGGHTS where that is another one, else nullptr
 
   bool allows(double value) const {
     return (above_low ? value > low : value >= low) && value <= high && (infinite || std::isfinite(value));
   }
   bool required() const { return std::isnan(otherwise); }
 };
-
-/// "static_friction" is "staticFriction".
-inline std::string camel_case(const std::string& name) {
-  std::string out;
-  bool upper = false;
-  for (const char c : name) {
-    if (c != '_') out += upper ? static_cast<char>(c - 'a' + 'A') : c;
-    upper = c == '_';
-  }
-  return out;
-}
 
 inline std::string number_text(double value) {
   char text[32];
@@ -52,6 +44,12 @@ inline std::string range_text(const Parameter& p) {
   if (std::isfinite(p.high)) text += " and <= " + number_text(p.high);
   else if (!p.infinite) text += " and finite";
   return text;
+}
+
+/// One line for a user: what it is, in which unit and range, and its default.
+inline std::string description(const Parameter& p) {
+  return std::string(p.doc) + (std::string(p.unit) == "1" ? "" : std::string(" [") + p.unit + "]") + "; " + range_text(p) +
+         (p.required() ? "; no default" : "; default " + number_text(p.otherwise));
 }
 
 /// The line about a wrong value: what, what would be right. `name`: as the user has written it.

@@ -3,6 +3,8 @@
 #include <map>
 #include <set>
 #include <string>
+#include <type_traits>
+#include <vector>
 
 #include "catch.hpp"
 #include "dembark/parameters/contact_parameters.hpp"
@@ -15,14 +17,15 @@ struct Refused {
   std::string line;
 };
 
+/// Something in its range for each number.
 class Numbers : public ContactSource {
  public:
-  std::map<std::string, double> values{{"youngs_modulus", 1e7},    {"poissons_ratio", 0.3},   {"restitution", 0.8},
-                                       {"static_friction", 0.5},   {"kinetic_friction", 0.4}, {"critical_slip_distance", 1e-5},
-                                       {"surface_tension", 0.07},  {"contact_angle", 0.2},    {"bridge_volume", 1e-12},
-                                       {"liquid_viscosity", 1e-3}, {"minimum_gap", 1e-6},     {"cohesive_force", 1e-5},
-                                       {"work_of_adhesion", 0.05}, {"rolling_friction", 0.1}, {"characteristic_velocity", 1.0}};
+  std::map<std::string, double> values;
   mutable std::set<std::string> asked;
+
+  Numbers() {
+    for (const Parameter& p : contact_parameters) values[p.name] = std::isfinite(p.high) ? 0.5 * (p.low + p.high) : p.low + 1.0;
+  }
 
   std::string name(const Parameter& p) const override { return p.name; }
   double given(const Parameter& p, int) const override {
@@ -46,29 +49,57 @@ std::string refusal(const ContactOptions& options, const Numbers& numbers) {
 ContactOptions everything() {
   ContactOptions options;
   options.normal_law = NormalLaw::hooke;
-  options.rolling_model = RollingModel::elastic_plastic;
+  options.rolling_resistance = RollingModel::elastic_plastic;
   options.cohesion = CohesionLaw::bridge;
   options.viscous = true;
   return options;
 }
 
+/// The same with each law of cohesion, and with each value of each choice.
+std::vector<ContactOptions> all_laws() {
+  std::vector<ContactOptions> all;
+  for (const CohesionLaw law : {CohesionLaw::bridge, CohesionLaw::constant, CohesionLaw::dmt}) {
+    all.push_back(everything());
+    all.back().cohesion = law;
+  }
+  for (int which = 0; which < contact_choice_count; ++which)
+    for (std::size_t value = 0, count = 1; value < count; ++value) {
+      ContactOptions options = everything();
+      int at = 0;
+      each_choice(options, [&](const char*, const char*, auto& option, const auto& values, const char*) {
+        if (at++ != which) return;
+        count = values.size();
+        option = static_cast<std::decay_t<decltype(option)>>(value);
+      });
+      all.push_back(options);
+    }
+  return all;
+}
+
+/// "static_friction" is "staticFriction".
+std::string in_camel_case(const std::string& name) {
+  std::string out;
+  bool upper = false;
+  for (const char c : name) {
+    if (c != '_') out += upper ? static_cast<char>(c - 'a' + 'A') : c;
+    upper = c == '_';
+  }
+  return out;
+}
+
 }  // namespace
 
 TEST_CASE("all laws together ask for each number once known, and each is refused out of its range", "[parameters]") {
-  Numbers numbers;
-  std::set<std::string> asked;
-  for (const CohesionLaw law : {CohesionLaw::bridge, CohesionLaw::constant, CohesionLaw::dmt}) {
-    ContactOptions options = everything();
-    options.cohesion = law;
+  std::map<std::string, ContactOptions> asked;  // by whom
+  for (const ContactOptions& options : all_laws()) {
+    const Numbers numbers;
     CHECK(refusal(options, numbers).empty());
-    asked.insert(numbers.asked.begin(), numbers.asked.end());
+    for (const std::string& name : numbers.asked) asked[name] = options;
   }
   for (const Parameter& p : contact_parameters) {
-    CHECK(asked.count(p.name) == 1);
-    ContactOptions options = everything();
-    if (std::string(p.name) == "cohesive_force") options.cohesion = CohesionLaw::constant;
-    if (std::string(p.name) == "work_of_adhesion") options.cohesion = CohesionLaw::dmt;
-    Numbers wrong = numbers;
+    REQUIRE(asked.count(p.name) == 1);
+    const ContactOptions& options = asked[p.name];
+    Numbers wrong;
     for (const double value : {p.low - 1.0, p.above_low ? p.low : double(NAN), p.infinite ? double(NAN) : double(INFINITY)}) {
       if (std::isnan(value)) continue;
       wrong.values[p.name] = value;
@@ -83,7 +114,7 @@ TEST_CASE("all laws together ask for each number once known, and each is refused
 
 TEST_CASE("what does not go together is refused", "[parameters]") {
   Numbers numbers;
-  numbers.values["kinetic_friction"] = 0.6;
+  numbers.values["kinetic_friction"] = 1.1;
   CHECK(refusal({}, numbers).find("must not exceed") != std::string::npos);
   numbers.values["kinetic_friction"] = 0.5;
   ContactOptions jkr = everything();
@@ -98,9 +129,25 @@ TEST_CASE("a table has each name once, with a sentence", "[parameters]") {
   std::set<std::string> names;
   for (const Parameter& p : contact_parameters) {
     CHECK(names.insert(p.name).second);
+    CHECK(p.camel_case == in_camel_case(p.name));
     CHECK(std::string(p.doc).size() > 10);
     CHECK((std::isnan(p.otherwise) || p.allows(p.otherwise)));
     CHECK(&parameter(static_cast<ContactNumber>(&p - contact_parameters)) == &p);
   }
-  CHECK(camel_case("critical_slip_distance") == "criticalSlipDistance");
+}
+
+TEST_CASE("choices have each value once, and begin with their default", "[parameters]") {
+  ContactOptions options;
+  int count = 0;
+  each_choice(options, [&](const std::string& name, const std::string& camel, auto& option, const auto& values, const std::string& doc) {
+    ++count;
+    CHECK(camel == in_camel_case(name));
+    CHECK(static_cast<int>(option) == 0);
+    CHECK(std::set<std::string>(values.begin(), values.end()).size() == values.size());
+    CHECK(option_from_name(values, values.back(), option));
+    CHECK(static_cast<std::size_t>(option) == values.size() - 1);
+    CHECK(doc.size() > 10);
+  });
+  CHECK(count == contact_choice_count);
+  CHECK(options.rolling_resistance == RollingModel::elastic_plastic);
 }

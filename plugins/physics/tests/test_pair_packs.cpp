@@ -95,14 +95,7 @@ struct Scene : ContactCallbacks, HistoryCallbacks {
   void step(const PairLoops& loops) {
     f.assign(x.size(), 0.0);
     torque.assign(x.size(), 0.0);
-    const PackedCoefficients<double> numbers{law.elasticity.effective_youngs_modulus,
-                                             law.elasticity.effective_shear_modulus,
-                                             law.elasticity.damping,
-                                             law.friction.static_friction,
-                                             law.friction.kinetic_friction,
-                                             law.friction.interface_shear_strength,
-                                             kept_slip(law.friction, dt),
-                                             law.friction.critical_slip_distance};
+    const PackedCoefficients<double> numbers = packed_coefficients(law, dt);
     std::vector<int> grains, numneigh;
     std::vector<int*> lists, touches;
     std::vector<double*> rows;
@@ -127,7 +120,7 @@ struct Scene : ContactCallbacks, HistoryCallbacks {
     s.limit_force = law.limit_force;
     s.tangential_damping = law.tangential_damping;
     s.elastic_limit = law.friction.friction_limit == FrictionLimit::elastic;
-    s.pack_friction = law.friction.presliding != Presliding::exponential;
+    s.pack_friction = packs_know(law.friction);
     s.rolls = law.rolling.on();
     s.x = x.data(), s.v = v.data(), s.omega = omega.data(), s.radius = radius.data(), s.mass = mass.data();
     s.type = type.data(), s.mask = mask.data();

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dembark import _physics
 from dembark.physics._checks import contact_number, numbers
 from dembark.physics.capillary import check_model
-from dembark.physics.friction import FinnieRabinowicz
+from dembark.physics.friction import FrictionLaw
 from dembark.physics.viscous import check_viscous
 
 Vector = tuple[float, float, float]
@@ -77,7 +77,7 @@ class Contact:
 
     effective_youngs_modulus, effective_shear_modulus : E*, G*, Pa
     restitution : 0 < e <= 1
-    friction : the tangential law
+    friction : the tangential law, `FinnieRabinowicz` or another `FrictionLaw`
     normal_law : 'hertz' or 'hooke' (with characteristic_velocity, m/s)
     cohesion : 'none', 'bridge', 'constant' (cohesive_force, N), 'dmt' or 'jkr' (work_of_adhesion, J/m^2), see `dembark.physics.adhesion`;
         default: 'bridge' with a bridge_volume, else 'none'
@@ -89,7 +89,7 @@ class Contact:
     effective_youngs_modulus: float
     effective_shear_modulus: float
     restitution: float
-    friction: FinnieRabinowicz
+    friction: FrictionLaw
     normal_law: str = "hertz"
     characteristic_velocity: float = 1.0
     tangential_damping: bool = True

@@ -1,15 +1,15 @@
-"""The Finnie-Rabinowicz tangential law, driven along a given path."""
+"""Tangential laws, driven along a given path."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import Limits, contact_number, numbers
+from dembark.physics._checks import CONTACT_PARAMETERS, Limits, contact_number, numbers
 
 
 @dataclass(frozen=True)
@@ -21,46 +21,21 @@ class FrictionPath:
     dissipated_energy: NDArray[np.float64]  # J, up to each step
 
 
-@dataclass(frozen=True, kw_only=True)
-class FinnieRabinowicz:
-    """Friction that falls with slip from a static to a kinetic coefficient and saturates at the interface's shear strength.
+class FrictionLaw:
+    """A friction law by the numbers and choices that the engines know, under their names in the table of parameters.
 
-        mu(s) = mu_k + (mu_s - mu_k) exp(-s / s_c)
-        T_max = tau_s A [1 - exp(-mu(s) N / (tau_s A))]
+    given : numbers (SI units) and words; what a law needs and does not get, and what no law knows, is a ValueError
 
-    A reconstruction from Rabinowicz (J. Appl. Phys. 22 (1951) 1373; Proc. Phys. Soc. 71 (1958) 668) and Finnie & Shaw (Trans. ASME
-    78 (1956) 1649): no source writes the law under both names.
-
-    static_friction, kinetic_friction : mu_s >= mu_k >= 0
-    critical_slip_distance : s_c, m, >= 0
-    interface_shear_strength : tau_s, Pa, > 0; inf = unlimited (Coulomb)
-    presliding : 'linear' (T = k_t u up to the limit), 'exponential' (T = T_max (1 - exp(-k_t u / T_max)), Dahl) or 'partial_slip' (a
-        Hertzian contact whose rim slips first; Mindlin and Deresiewicz, with the loading history)
-    friction_limit : what limits friction in a contact, N above: 'total', the normal force with its dashpot, or 'elastic', that of its
-        spring alone; `drive` and `follow` are given N
-    healing_time : s, time constant with which a contact that sticks forgets its slip; 0 = at once
-
-    >>> law = FinnieRabinowicz(static_friction=0.5, kinetic_friction=0.4, critical_slip_distance=1e-5, interface_shear_strength=np.inf)
+    >>> law = FrictionLaw(static_friction=0.5, kinetic_friction=0.4, critical_slip_distance=1e-5)
     >>> law.drive(1.0, 1e5, 1e-6, [1e-6, 1e-3]).round(6).tolist()
     [0.1, 0.4]
     """
 
-    static_friction: float
-    kinetic_friction: float
-    critical_slip_distance: float
-    interface_shear_strength: float = np.inf
-    presliding: str = "linear"
-    healing_time: float = 0.0
-    friction_limit: str = "total"
-    _law: _physics.FinnieRabinowicz = field(init=False, repr=False, compare=False)
+    _law: _physics.Friction
 
-    def __post_init__(self) -> None:
-        for name in ("static_friction", "kinetic_friction", "critical_slip_distance", "interface_shear_strength", "healing_time"):
-            contact_number(name, getattr(self, name))
-        object.__setattr__(self, "_law", _physics.FinnieRabinowicz(
-            float(self.static_friction), float(self.kinetic_friction), float(self.critical_slip_distance),
-            float(self.interface_shear_strength), float(self.healing_time), self.presliding,
-            self.friction_limit))
+    def __init__(self, **given: float | str) -> None:
+        object.__setattr__(self, "_law", _physics.Friction({
+            name: value if name not in CONTACT_PARAMETERS else float(contact_number(name, value)) for name, value in given.items()}))
 
     def friction_coefficient(self, slip: ArrayLike) -> NDArray[np.float64] | float:
         """mu(s) for the slip s (m, >= 0)."""
@@ -108,3 +83,39 @@ class FinnieRabinowicz:
             normal)
         shaped = force[:, 0] if path.ndim == 1 else force[:, : path.shape[1]]
         return FrictionPath(np.array(shaped), slip, energy)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FinnieRabinowicz(FrictionLaw):
+    """Friction that falls with slip from a static to a kinetic coefficient and saturates at the interface's shear strength.
+
+        mu(s) = mu_k + (mu_s - mu_k) exp(-s / s_c)
+        T_max = tau_s A [1 - exp(-mu(s) N / (tau_s A))]
+
+    A reconstruction from Rabinowicz (J. Appl. Phys. 22 (1951) 1373; Proc. Phys. Soc. 71 (1958) 668) and Finnie & Shaw (Trans. ASME
+    78 (1956) 1649): no source writes the law under both names.
+
+    static_friction, kinetic_friction : mu_s >= mu_k >= 0
+    critical_slip_distance : s_c, m, >= 0
+    interface_shear_strength : tau_s, Pa, > 0; inf = unlimited (Coulomb)
+    presliding : 'linear' (T = k_t u up to the limit), 'exponential' (T = T_max (1 - exp(-k_t u / T_max)), Dahl) or 'partial_slip' (a
+        Hertzian contact whose rim slips first; Mindlin and Deresiewicz, with the loading history)
+    friction_limit : what limits friction in a contact, N above: 'total', the normal force with its dashpot, or 'elastic', that of its
+        spring alone; `drive` and `follow` are given N
+    healing_time : s, time constant with which a contact that sticks forgets its slip; 0 = at once
+
+    >>> law = FinnieRabinowicz(static_friction=0.5, kinetic_friction=0.4, critical_slip_distance=1e-5, interface_shear_strength=np.inf)
+    >>> law.drive(1.0, 1e5, 1e-6, [1e-6, 1e-3]).round(6).tolist()
+    [0.1, 0.4]
+    """
+
+    static_friction: float
+    kinetic_friction: float
+    critical_slip_distance: float
+    interface_shear_strength: float = np.inf
+    presliding: str = "linear"
+    healing_time: float = 0.0
+    friction_limit: str = "total"
+
+    def __post_init__(self) -> None:
+        super().__init__(**vars(self))

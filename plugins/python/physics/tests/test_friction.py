@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dembark.physics import FinnieRabinowicz
+from dembark.physics import FinnieRabinowicz, FrictionLaw
 
 N, K, AREA = 2.0, 1e5, 1e-6
 RAMP = np.linspace(0.0, 2e-4, 4001)[1:]
@@ -242,3 +242,15 @@ def test_shapes():
     assert WEAK.drive(N, K, AREA, np.zeros((5, 2))).shape == (5, 2)
     assert WEAK.drive(np.full(5, N), np.full(5, K), np.full(5, AREA), np.zeros((5, 3))).shape == (5, 3)
     assert WEAK.drive(N, K, AREA, np.zeros((0, 3))).shape == (0, 3)
+
+
+def test_any_law_by_the_names_of_the_table():
+    """The same numbers and words, with and without a class of their own; what a law needs is missed, what none knows is refused."""
+    given = {"static_friction": 0.5, "kinetic_friction": 0.3, "critical_slip_distance": 1e-5, "presliding": "exponential"}
+    np.testing.assert_array_equal(FrictionLaw(**given).drive(N, K, AREA, RAMP), FinnieRabinowicz(**given).drive(N, K, AREA, RAMP))
+    with pytest.raises(ValueError, match="critical_slip_distance is missing"):
+        FrictionLaw(static_friction=0.5, kinetic_friction=0.3)
+    with pytest.raises(ValueError, match="no parameter 'slip_distance'"):
+        FrictionLaw(**given, slip_distance=1e-5)
+    with pytest.raises(TypeError, match="presliding must be a word"):
+        FrictionLaw(**given | {"presliding": 1})
