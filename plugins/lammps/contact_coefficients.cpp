@@ -82,9 +82,9 @@ void ContactCoefficients::settings(int narg, char** arg) {
     if (!p.allows(value)) fail(dembark::wrong_value(p, p.name, value));
     global_[std::size_t(which)] = value;
   };
-  std::vector<std::string> keywords = {"normal",         "cohesion",           "capillary_model", "viscous_liquid",
-                                       "carried_liquid", "tangential_damping", "limit_force"};
+  std::vector<std::string> keywords = {"normal"};
   each_choice(options_, [&](const char* name, auto&&...) { keywords.emplace_back(name); });
+  keywords.insert(keywords.end(), {"cohesion", "capillary_model", "viscous_liquid", "carried_liquid", "tangential_damping", "limit_force"});
   for (const dembark::Parameter& each : dembark::contact_parameters)
     if (is_keyword(each)) keywords.emplace_back(each.name);
   for (int k = 0; k < narg;) {

@@ -164,7 +164,7 @@ void LawKinds::clear() {
 std::vector<::dembark::PackedCoefficients<double>> LawKinds::laws(double dt) {
 	const std::lock_guard<std::mutex>                  lock(guard);
 	std::vector<::dembark::PackedCoefficients<double>> all;
-	for (const Kind& kind : kinds) all.push_back(packed_coefficients(kind, dt));
+	for (const Kind& kind : kinds) all.push_back(::dembark::packed_coefficients(kind, dt));
 	return all;
 }
 

@@ -30,7 +30,7 @@
 #define DEMBARK_GIVEN_NUMBER(scope, ...) DEMBARK_GIVEN_NUMBER_##scope(__VA_ARGS__)
 #define DEMBARK_GIVEN_NUMBER_pair(name, camel, ...) \
 	((shared_ptr<MatchMaker>,camel,,Attr::triggerPostLoad,description(parameter(::dembark::ContactNumber::name))+))
-#define DEMBARK_GIVEN_NUMBER_global(name, camel, unit, low, above, high, infinite, otherwise, ...) \
+#define DEMBARK_GIVEN_NUMBER_global(name, camel, ...) \
 	((Real,camel,::dembark::parameter(::dembark::ContactNumber::name).otherwise,,description(parameter(::dembark::ContactNumber::name))+))
 #define DEMBARK_CHOICE(name, camel, type, first, names, doc) \
 	((string,camel,#first,Attr::triggerPostLoad,dembark_yade::listed(doc,::dembark::names())+))
