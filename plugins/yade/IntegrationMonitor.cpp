@@ -171,7 +171,7 @@ void IntegrationMonitor::takeContacts() {
 		const auto* const geom = dynamic_cast<const ScGeom*>(interaction->geom.get());
 		const auto* const phys = dynamic_cast<const NormPhys*>(interaction->phys.get());
 		if (!geom || !phys || !(geom->penetrationDepth > 0.0)) continue;
-		const Real mass = ::dembark::reduced<Real>(dembark_yade::inertialMass(body1), dembark_yade::inertialMass(body2));
+		const Real mass = ::dembark::reduced(dembark_yade::inertialMass(body1), dembark_yade::inertialMass(body2));
 		if (std::isinf(mass)) continue;
 		Real stiffness = phys->kn;
 		int  wall      = 0;
@@ -180,7 +180,7 @@ void IntegrationMonitor::takeContacts() {
 			wall              = ours->wallBody;
 			const Real radius = wall == 1   ? geom->radius2
 			                    : wall == 2 ? geom->radius1
-			                                : ::dembark::reduced<Real>(geom->radius1, geom->radius2);
+			                                : ::dembark::reduced(geom->radius1, geom->radius2);
 			if (impacts > 0 && wall == 0) beginImpact(*interaction, *ours);
 			stiffness = ours->contact.respond(radius, mass, geom->penetrationDepth, 0.0).normal_stiffness;
 		} else {
