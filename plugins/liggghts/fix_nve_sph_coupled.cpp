@@ -1,6 +1,5 @@
 #include "fix_nve_sph_coupled.h"
 
-#include <algorithm>
 #include <cstring>
 
 #include "atom.h"
@@ -11,13 +10,13 @@
 #include "update.h"
 
 #include "fix_sph_body.h"
-#include "dembark/keyword_reader.hpp"
 #include "pair_sph_coupled.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
-using dembark::keywords::text;
 using dembark::sph::Energies;
+using dembark::sph::Vector;
+using dembark_family::vector;
 
 FixNveSphCoupled::FixNveSphCoupled(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
   if (narg != 3) fail("it takes no keywords: all numbers stand in pair_style sph/coupled");
@@ -41,6 +40,7 @@ void FixNveSphCoupled::pre_delete(bool unfixed) {
   if (unfixed && shifts_) modify->delete_fix(shifts_->id);
 }
 
+/// Before forces it does nothing but in the set-up.
 int FixNveSphCoupled::setmask() { return INITIAL_INTEGRATE | PRE_FORCE | FINAL_INTEGRATE; }
 
 void FixNveSphCoupled::init() {
@@ -64,32 +64,29 @@ void FixNveSphCoupled::setup_pre_force(int) {
   summed_ = -1;
 }
 
-void FixNveSphCoupled::kick() {
-  const double factor = 0.5 * update->dt / pair_->fluid().mass();
-  for (int i = 0; i < atom->nlocal; ++i)
-    if (atom->mask[i] & groupbit)
-      for (int k = 0; k < 3; ++k) atom->v[i][k] += factor * atom->f[i][k];
-}
-
 void FixNveSphCoupled::initial_integrate(int) {
-  kick();
-  const double dt = update->dt, sound = pair_->fluid().state.sound_speed;
+  const dembark::sph::Settings &fluid = pair_->fluid();
+  const double dt = update->dt, factor = 0.5 * dt / fluid.mass();
+  double *const *const by = shifts();
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!(atom->mask[i] & groupbit)) continue;
-    const double *const v = atom->v[i], *const by = shifts_ ? shifts_->array_atom[i] : nullptr;
-    const double squared = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    // As a speed that is no number compares, too.
-    if (!(squared <= sound * sound))
-      fail_alone("the fluid blew up: at step " + std::to_string(update->ntimestep) + " atom " + std::to_string(atom->tag[i]) +
-                 " moves at " + text(std::sqrt(squared)) + " m/s, faster than sound (" + text(sound) +
-                 " m/s); take a larger sound_speed, a shorter step or thicker walls");
-    for (int k = 0; k < 3; ++k) atom->x[i][k] += dt * v[k] + (by ? by[k] : 0.0);
+    Vector x = vector(atom->x[i]), v = vector(atom->v[i]);
+    dembark::sph::first_half(x, v, factor * vector(atom->f[i]), by ? vector(by[i]) : Vector{}, dt);
+    if (!slower_than_sound(fluid, v))
+      fail_alone("the fluid blew up: at step " + std::to_string(update->ntimestep) + " atom " + std::to_string(atom->tag[i]) + " " +
+                 too_fast(fluid, v));
+    atom->x[i][0] = x.x, atom->x[i][1] = x.y, atom->x[i][2] = x.z;
+    atom->v[i][0] = v.x, atom->v[i][1] = v.y, atom->v[i][2] = v.z;
   }
 }
 
-void FixNveSphCoupled::pre_force(int) { pair_->advance(update->dt, shifts_ ? shifts_->array_atom : nullptr); }
+void FixNveSphCoupled::final_integrate() {
+  const double factor = 0.5 * update->dt / pair_->fluid().mass();
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (atom->mask[i] & groupbit) dembark_family::add(atom->v[i], vector(atom->f[i]), factor);
+}
 
-void FixNveSphCoupled::final_integrate() { kick(); }
+double **FixNveSphCoupled::shifts() const { return shifts_ ? shifts_->array_atom : nullptr; }
 
 /// Kinetic, potential and compression energy of the fluid, energy of bodies, of the contact potential; lost by viscosity, diffusion and at
 /// walls, done by walls and loads. Collective.
@@ -100,12 +97,12 @@ double FixNveSphCoupled::compute_vector(int n) {
     const double mine[] = {e.kinetic, e.potential, e.compression, 0.0, e.contact, e.viscous, e.diffusive, e.boundary, 0.0};
     MPI_Allreduce(mine, totals_, 9, MPI_DOUBLE, MPI_SUM, world);
     for (int k = 0; k < 3; ++k) totals_[5 + k] += saved_[k];
-    const dembark::sph::Vector &g = pair_->fluid().gravity;
+    const Vector &g = pair_->fluid().gravity;
     for (Fix *const fix : fixes()) {
       const auto *const solid = dynamic_cast<FixSphBody *>(fix);
       if (!solid) continue;
       const dembark::sph::Body &body = solid->body();
-      if (body.free) totals_[3] += body.kinetic_energy() - body.mass * dot(g, body.position);
+      totals_[3] += body.energy(g);
       totals_[8] += solid->work();
     }
     summed_ = update->ntimestep;

@@ -25,15 +25,15 @@ class FixNveSphCoupled : public dembark_family::SharedFix {
   double extend_cut_ghost();
   void setup_pre_force(int);
   void initial_integrate(int);
-  void pre_force(int);
   void final_integrate();
   double compute_vector(int);
   void write_restart(FILE *);
   void restart(char *);
 
- private:
-  void kick();
+  /// m, of each atom; nullptr: without shifting.
+  double **shifts() const;
 
+ private:
   class PairSphCoupled *pair_ = nullptr;
   class FixPropertyAtom *shifts_ = nullptr;
   bool first_ = true;     // no run was before, in this process or that of a restart file

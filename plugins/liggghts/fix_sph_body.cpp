@@ -170,19 +170,12 @@ void FixSphBody::gather_forces() {
   body.accelerate(gravity_);
 }
 
-double FixSphBody::power() const {
-  const Body &b = state_.body;
-  return b.free ? dot(b.load, b.velocity) + dot(b.load_torque, b.spin) : -dot(b.force, b.velocity) - dot(b.torque, b.spin);
-}
-
 void FixSphBody::initial_integrate(int) {
   Body &body = state_.body;
   // Fixes may add forces in the set-up after this one.
   if (fresh_) gather_forces();
   fresh_ = false;
-  body.kick(0.5 * update->dt);
-  state_.work += 0.5 * update->dt * power();
-  body.drift(update->dt);
+  state_.work += 0.5 * update->dt * body.first_half(update->dt);
   // A wall at rest stays where it is.
   const bool still = !moved_by_others_ && !body.free && norm(body.velocity) == 0.0 && norm(body.spin) == 0.0;
   if (!still) place_particles();
@@ -190,8 +183,7 @@ void FixSphBody::initial_integrate(int) {
 
 void FixSphBody::final_integrate() {
   gather_forces();
-  state_.work += 0.5 * update->dt * power();
-  state_.body.kick(0.5 * update->dt);
+  state_.work += 0.5 * update->dt * state_.body.second_half(update->dt);
 }
 
 void FixSphBody::place_particles() {

@@ -55,7 +55,6 @@ class FixSphBody : public dembark_family::SharedFix {
  private:
   void gather_forces();
   void place_particles();
-  double power() const;
 
   struct State {
     dembark::sph::Body body;

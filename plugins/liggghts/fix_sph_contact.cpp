@@ -6,11 +6,13 @@
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
+#include "force.h"
 #include "modify.h"
 #include "update.h"
 
 #include "dembark/keyword_reader.hpp"
 #include "fix_sph_body.h"
+#include "pair_sph_coupled.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
@@ -18,7 +20,7 @@ using namespace dembark::sph;
 using dembark::keywords::Reader;
 using dembark::keywords::text;
 
-FixSphContact::FixSphContact(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg), films_(lmp) {
+FixSphContact::FixSphContact(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
   if (domain->dimension != 3) fail("boxes are for three dimensions");
   checked([&] { read(std::vector<std::string>(arg + 3, arg + narg)); });
   restart_global = 1;
@@ -98,9 +100,12 @@ void FixSphContact::init() {
   if (update->dt > most)
     fail("the time step must be at most " + text(most) + " s for this stiffness, not " + text(update->dt) + " s; take a softer one");
   if (slit_pressure_ == 0.0) return;
+  PairSphCoupled *const pair = PairSphCoupled::find(force);
   std::vector<LatticePlane> planes;
   for (const ContactPlane &plane : contacts_.planes) planes.push_back({plane.point, plane.normal});
-  checked([&] { films_.begin(fixes_, names_, contacts_.half, planes); });
+  std::vector<int> numbers;
+  for (const FixSphBody *const solid : fixes_) numbers.push_back(pair->number(solid));
+  checked([&] { pair->films().begin(fixes_, names_, numbers, contacts_.half, planes, slit_pressure_); });
 }
 
 /// Forces of the state as it is.
@@ -119,7 +124,6 @@ void FixSphContact::push(bool remember) {
     fail("at step " + std::to_string(update->ntimestep) + " boxes overlap by " + text(contacts_.deepest) + " m, more than the rounding, " +
          text(contacts_.radius) + " m; take a higher stiffness");
   for (std::size_t k = 0; k < fixes_.size(); ++k) fixes_[k]->add_load(wrenches[k].force, wrenches[k].torque);
-  if (slit_pressure_ > 0.0) films_.push(slit_pressure_);
 }
 
 /// Energy in the springs (J), largest overlap (m), how many points touch.

@@ -15,7 +15,6 @@ FixStyle(sph/contact,FixSphContact)
 
 #include "dembark/sph/box_contacts.hpp"
 #include "shared_fix.h"
-#include "sph_films.h"
 
 namespace LAMMPS_NS {
 
@@ -36,7 +35,6 @@ class FixSphContact : public dembark_family::SharedFix {
   void push(bool remember);
 
   dembark::sph::BoxContacts contacts_;
-  dembark_liggghts::SphFilms films_;
   double slit_pressure_ = 0.0;
   /// What the stretches of a state belong to.
   std::string written() const;

@@ -22,33 +22,34 @@
 #include "fix_nve_sph_coupled.h"
 #include "fix_sph_body.h"
 #include "dembark/keyword_reader.hpp"
+#include "dembark/sph/best_loops.hpp"
 #include "dembark/sph/crowding.hpp"
 #include "pair_sph_options.h"
 
 using namespace LAMMPS_NS;
 using namespace dembark::sph;
+using dembark_family::vector;
+using dembark_liggghts::SphParticle;
 using dembark_liggghts::SphRole;
 
-namespace dembark::sph {
-#if defined(__x86_64__)
-extern const Loops avx2_loops;
-#endif
-}  // namespace dembark::sph
+/// Roles of the solids, in the order of Scene::solids.
+static constexpr SphRole solid_roles[2] = {SphRole::solid, SphRole::repelling};
 
-namespace {
+struct PairSphCoupled::Images {
+  PairSphCoupled &own;
 
-const Loops &loops_of_processor() {
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return avx2_loops;
-#endif
-  return portable_loops();
-}
+  void send_densities(Scene &) const { send(false); }
+  void send_walls(Scene &) const { send(true); }
+  const std::vector<double> &box_pressures(const Scene &) const { return own.films_.pressures(own.particle_); }
 
-using dembark_family::vector;
+ private:
+  void send(bool walls) const {
+    own.walls_to_ghosts_ = walls;
+    own.comm->forward_comm_pair(&own);
+  }
+};
 
-}  // namespace
-
-PairSphCoupled::PairSphCoupled(LAMMPS *lmp) : Pair(lmp), loops_(&loops_of_processor()) {
+PairSphCoupled::PairSphCoupled(LAMMPS *lmp) : Pair(lmp), films_(lmp, scene_) {
   single_enable = 0;
   no_virial_fdotr_compute = 1;
   restartinfo = 1;
@@ -71,11 +72,11 @@ void PairSphCoupled::refuse(const std::string &what) const {
 void PairSphCoupled::read(const std::vector<std::string> &words) {
   words_ = words;
   try {
-    settings_ = dembark_liggghts::read_fluid_settings(words, domain->dimension);
+    scene_.settings = dembark_liggghts::read_fluid_settings(words, domain->dimension);
   } catch (const std::invalid_argument &wrong) {
     refuse(wrong.what());
   }
-  numbers_ = loop_numbers(settings_);
+  passes_ = std::make_unique<Passes>(scene_.settings, best_loops());
 }
 
 void PairSphCoupled::settings(int narg, char **arg) { read(std::vector<std::string>(arg, arg + narg)); }
@@ -111,10 +112,16 @@ void PairSphCoupled::init_style() {
     if (fluid) fluid_fix_ = fluid;
   }
   if (!fluid_fix_) refuse("nothing moves the fluid; add fix ID group nve/sph/coupled, with the group of the fluid");
+  scene_.bodies.assign(solids_.size(), Body{});
+  films_.clear();
   neighbor->request(this);
 }
 
-double PairSphCoupled::init_one(int, int) { return support * settings_.h(); }
+int PairSphCoupled::number(const FixSphBody *solid) const {
+  return int(std::find(solids_.begin(), solids_.end(), solid) - solids_.begin());
+}
+
+double PairSphCoupled::init_one(int, int) { return support * scene_.settings.h(); }
 
 void PairSphCoupled::find_gravity() {
   Vector gravity{};
@@ -133,22 +140,22 @@ void PairSphCoupled::find_gravity() {
       outside = outside || ((atom->mask[i] & fluid_fix_->groupbit) && !(atom->mask[i] & found->groupbit));
     refuse_if_any(outside ? "the group of fix gravity must hold the whole fluid" : "");
   }
-  settings_.gravity = gravity;
+  scene_.settings.gravity = gravity;
 }
 
 void PairSphCoupled::begin(bool first) {
-  if (update->dt > settings_.longest_step() * (1.0 + 1e-9))
-    refuse("the time step must be at most 0.6 h/sound_speed = " + dembark::keywords::text(settings_.longest_step()) + " s, not " +
-           dembark::keywords::text(update->dt) + " s");
+  const Settings &s = scene_.settings;
+  if (const std::string wrong = s.step_error(update->dt); !wrong.empty()) refuse(wrong);
   find_gravity();
   sort_particles();
   refuse_if_any(wrong_atom());
+  if (s.boundary == Boundary::dynamic)
+    for (int i = 0; i < atom->nlocal + atom->nghost; ++i)
+      if (particle_[i].role != SphRole::fluid) atom->rho[i] = std::max(atom->rho[i], s.state.density);
+  load();
   if (first) refuse_if_any(overlap());
-  for (int i = 0; i < atom->nlocal + atom->nghost; ++i) {
-    if (role_[i] != SphRole::fluid && settings_.boundary == Boundary::dynamic && atom->rho[i] < settings_.state.density)
-      atom->rho[i] = settings_.state.density;
-    if (role_[i] == SphRole::fluid) atom->p[i] = settings_.state.pressure(atom->rho[i]);
-  }
+  passes_->pressures(scene_);
+  for (std::size_t k = 0; k < atoms_[0].size(); ++k) atom->p[atoms_[0][k]] = scene_.fluid.pressure[k];
 }
 
 /// Ends the run with the line of the lowest rank that has one. Collective: what one rank prints alone may land within a line of another.
@@ -171,19 +178,21 @@ std::string PairSphCoupled::wrong_atom() const {
 
 std::string PairSphCoupled::wrong_with(int i) const {
   using dembark::keywords::text;
-  const double due = settings_.mass();
-  int groups = role_[i] == SphRole::fluid;
+  const Settings &s = scene_.settings;
+  const double due = s.mass();
+  const bool fluid = particle_[i].role == SphRole::fluid;
+  int groups = fluid;
   for (const FixSphBody *solid : solids_) groups += (atom->mask[i] & solid->groupbit) != 0;
   if (groups > 1) return "is in two groups of the fixes nve/sph/coupled, sph/wall and sph/body; it can be in one";
   if (groups == 0 && setflag[atom->type[i]][atom->type[i]])
     return "is in no group of the fixes nve/sph/coupled, sph/wall and sph/body; give it to one, or leave its type out of pair_coeff";
-  if (groups > 0 && settings_.dimension == 2 && !(std::fabs(atom->x[i][2]) <= 1e-6 * settings_.spacing))
+  if (groups > 0 && s.dimension == 2 && !(std::fabs(atom->x[i][2]) <= 1e-6 * s.spacing))
     return "is at z = " + text(atom->x[i][2]) + " m; in the plane all are at z = 0, one layer of the lattice";
-  if (role_[i] != SphRole::fluid) return "";
+  if (!fluid) return "";
   const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
   if (!(std::fabs(mass - due) <= 1e-6 * due))
-    return "of the fluid has the mass " + text(mass) + " kg where density * spacing^" + std::to_string(settings_.dimension) + " is " +
-           text(due) + " kg" + (atom->rmass ? "; set it by set group ... mass" : "; set it by mass TYPE ...");
+    return "of the fluid has the mass " + text(mass) + " kg where density * spacing^" + std::to_string(s.dimension) + " is " + text(due) +
+           " kg" + (atom->rmass ? "; set it by set group ... mass" : "; set it by mass TYPE ...");
   if (!(atom->rho[i] > 0.0) || std::isinf(atom->rho[i]))
     return "of the fluid has the density " + text(atom->rho[i]) + " kg/m^3; set it by set group ... meso_rho";
   return "";
@@ -191,233 +200,154 @@ std::string PairSphCoupled::wrong_with(int i) const {
 
 /// Which particle of this rank was created where others are; "": none.
 std::string PairSphCoupled::overlap() const {
-  const auto place = [this](int i) { return vector(atom->x[i]); };
-  Crowding crowding(settings_, std::size_t(atom->nlocal));
-  const int none = int(role_.size());
-  crowding.add(rows_.inner, none, true, place, place);
-  for (const Rows *rows : {&rows_.border, &rows_.of_fluid, &rows_.repelling_fluid}) crowding.add(*rows, none, false, place, place);
-  const int worst = crowding.worst();
-  return worst < 0 ? "" : "atom " + std::to_string(atom->tag[worst]) + " of the fluid " + crowding.line(worst);
+  const Crowding found = crowding(scene_);
+  const int worst = found.worst();
+  return worst < 0 ? "" : "atom " + std::to_string(atom->tag[atoms_[0][worst]]) + " of the fluid " + found.line(worst);
 }
 
 /// After each search of neighbours.
 void PairSphCoupled::sort_particles() {
   const int all = atom->nlocal + atom->nghost;
-  role_.assign(std::size_t(all), SphRole::none);
-  solid_of_.assign(std::size_t(all), -1);
+  FluidParticles &fluid = scene_.fluid;
+  particle_.assign(std::size_t(all), SphParticle{});
+  for (std::vector<int> &atoms : atoms_) atoms.clear();
+  fluid.id.clear();
+  for (Solids &set : scene_.solids) set.body.clear();
   for (int i = 0; i < all; ++i) {
     const int mask = atom->mask[i], type = atom->type[i];
     if (!setflag[type][type]) continue;
-    if (mask & fluid_fix_->groupbit) role_[i] = SphRole::fluid;
-    for (std::size_t k = 0; k < solids_.size() && role_[i] == SphRole::none; ++k)
+    const bool own = i < atom->nlocal;
+    SphParticle &particle = particle_[i];
+    if (mask & fluid_fix_->groupbit) {
+      particle.role = SphRole::fluid;
+      if (own) fluid.id.push_back(i);
+    }
+    for (std::size_t k = 0; k < solids_.size() && particle.role == SphRole::none; ++k)
       if (mask & solids_[k]->groupbit) {
-        role_[i] = settings_.contact.on() && solids_[k]->body().free ? SphRole::repelling : SphRole::solid;
-        solid_of_[i] = int(k);
+        const bool repels = scene_.settings.contact.on() && solids_[k]->body().free;
+        particle.role = solid_roles[repels];
+        if (own) scene_.solids[repels].body.push_back(int(k));
       }
+    if (particle.role == SphRole::none) continue;
+    std::vector<int> &atoms = atoms_[int(particle.role)];
+    particle.number = int(atoms.size());
+    atoms.push_back(i);
   }
-  rows_.build(role_, atom->nlocal, all, [this](const auto &pair) {
+  const auto resize = [](auto &particles, const std::vector<int> &atoms) {
+    particles.position.resize(atoms.size());
+    particles.velocity.resize(atoms.size());
+    particles.density.resize(atoms.size());
+    particles.pressure.resize(atoms.size());
+  };
+  resize(fluid, atoms_[0]);
+  fluid.shift.resize(fluid.id.size());
+  for (std::size_t s = 0; s < 2; ++s) resize(scene_.solids[s], atoms_[1 + s]);
+  rows_.build(particle_, atom->nlocal, scene_, [this](const auto &pair) {
     for (int ii = 0; ii < list->inum; ++ii) {
       const int i = list->ilist[ii];
       for (int k = 0; k < list->numneigh[i]; ++k) pair(i, list->firstneigh[i][k] & NEIGHMASK);
     }
   });
-  resize();
+  scene_.resize(vector(domain->boxhi) + Vector{1e3 * (domain->xprd + scene_.settings.h()), 0.0, 0.0});
 }
 
-void PairSphCoupled::resize() {
-  const std::size_t n = role_.size() + 1;
-  records_.resize(n);
-  rate_.resize(n);
-  sum_.resize(n);
-  velocity_.resize(n);
-  velocity_sum_.resize(n);
-  wall_velocity_.resize(n);
-  if (settings_.shifting.coefficient > 0.0) shift_sum_.resize(n);
-  records_.back() = far_record(vector(domain->boxhi) + Vector{1e3 * (domain->xprd + settings_.h()), 0.0, 0.0});
-}
-
-LoopArguments PairSphCoupled::arguments(const Rows &rows) {
-  LoopArguments in;
-  in.own = in.others = records_.data();
-  in.start = rows.start.data();
-  in.neighbour = rows.neighbour.data();
-  in.begin = rows.begin;
-  in.end = rows.end;
-  in.dimension = settings_.dimension;
-  in.h = settings_.h();
-  in.pair = numbers_.pair;
-  in.volume = settings_.mass() / settings_.state.density;
-  in.rate = rate_.data();
-  in.shift = shift_sum_.data();
-  in.sum = sum_.data();
-  in.velocity_sum = velocity_sum_.data();
-  return in;
-}
-
-void PairSphCoupled::advance(double dt, double **shifts) {
-  if (neighbor->ago == 0) sort_particles();
-  const int own = atom->nlocal, all = int(role_.size()), kernel = int(settings_.kernel), shifting = shifts != nullptr;
-  for (int i = 0; i < all; ++i) {
-    const Vector x = vector(atom->x[i]), v = vector(atom->v[i]);
-    records_[i] = role_[i] == SphRole::fluid ? density_record(settings_, x, v, atom->rho[i], atom->p[i]) : solid_record(x, v);
-  }
-  std::fill(rate_.begin(), rate_.end(), 0.0);
-  std::fill(shift_sum_.begin(), shift_sum_.end(), Quad{});
-  // The other rank has the other half of what pairs across the border lose.
-  const double lost = loops_->density_pairs[kernel][shifting](arguments(rows_.inner)) +
-                      0.5 * loops_->density_pairs[kernel][shifting](arguments(rows_.border));
-  lost_.diffusive += dt * settings_.mass() * lost;
-  loops_->density_across[kernel][shifting](arguments(rows_.of_fluid));
-  const bool dynamic = settings_.boundary == Boundary::dynamic;
-  if (dynamic) loops_->density_across[kernel][0](arguments(rows_.near_fluid));
-  for (int i = 0; i < own; ++i) {
-    if (role_[i] == SphRole::solid && dynamic) {
-      atom->rho[i] = boundary_density(settings_, atom->rho[i], rate_[i], dt);
-    } else if (role_[i] == SphRole::fluid) {
-      atom->drho[i] = rate_[i];
-      atom->rho[i] = fluid_density(settings_, numbers_, atom->rho[i], rate_[i], dt);
-      atom->p[i] = settings_.state.pressure(atom->rho[i]);
-      if (!shifting) continue;
-      const Quad &q = shift_sum_[i];
-      const Vector by =
-          shift(settings_.shifting, settings_.dimension, settings_.h(), settings_.spacing, dt, vector(atom->v[i]), {q.x, q.y, q.z}, q.w);
-      shifts[i][0] = by.x, shifts[i][1] = by.y, shifts[i][2] = by.z;
+/// The scene as the atoms and bodies are.
+void PairSphCoupled::load() {
+  const auto take = [this](auto &particles, const std::vector<int> &atoms) {
+    for (std::size_t k = 0; k < atoms.size(); ++k) {
+      const int i = atoms[k];
+      particles.position[k] = vector(atom->x[i]);
+      particles.velocity[k] = vector(atom->v[i]);
+      particles.density[k] = atom->rho[i];
+      particles.pressure[k] = atom->p[i];
     }
-  }
-  walls_to_ghosts_ = false;
-  comm->forward_comm_pair(this);
+  };
+  take(scene_.fluid, atoms_[0]);
+  for (std::size_t s = 0; s < 2; ++s) take(scene_.solids[s], atoms_[1 + s]);
+  for (std::size_t k = 0; k < solids_.size(); ++k) scene_.bodies[k] = solids_[k]->body();
 }
 
-int PairSphCoupled::pack_comm(int n, int *numbers, double *to, int, int *) {
+/// To atoms and bodies what the passes have computed; moved: densities, too.
+void PairSphCoupled::store(bool moved) {
+  const FluidParticles &fluid = scene_.fluid;
+  const Solids &walls = scene_.solids[0];
+  const bool extrapolated = scene_.settings.boundary == Boundary::extrapolated;
+  double *const *const shifts = fluid_fix_->shifts();
+  for (int k = 0; moved && k < fluid.with_images(); ++k) {
+    const int i = atoms_[0][k];
+    atom->rho[i] = fluid.density[k];
+    atom->p[i] = fluid.pressure[k];
+    if (k >= fluid.size()) continue;
+    atom->drho[i] = fluid.rate[k];
+    if (shifts) shifts[i][0] = fluid.shift[k].x, shifts[i][1] = fluid.shift[k].y, shifts[i][2] = fluid.shift[k].z;
+  }
+  for (int k = 0; k < walls.with_images(); ++k) {
+    const int i = atoms_[1][k];
+    atom->rho[i] = extrapolated ? walls.records[k].b : walls.density[k];
+    atom->p[i] = walls.pressure[k];
+  }
+  const auto push = [this](const std::vector<Quad> &sum, int own, const std::vector<int> &atoms) {
+    for (int k = 0; k < own; ++k) dembark_family::add(atom->f[atoms[k]], {sum[k].x, sum[k].y, sum[k].z}, scene_.settings.mass());
+  };
+  push(fluid.sum, fluid.size(), atoms_[0]);
+  for (std::size_t s = 0; s < 2; ++s) push(scene_.solids[s].sum, scene_.solids[s].size(), atoms_[1 + s]);
+  for (std::size_t k = 0; k < solids_.size(); ++k) {
+    const Body &body = scene_.bodies[k];
+    solids_[k]->add_force(body.force, body.torque);
+    solids_[k]->add_load(body.film, body.film_torque);
+  }
+}
+
+int PairSphCoupled::pack_comm(int n, int *atoms, double *to, int, int *) {
+  const Solids &walls = scene_.solids[0];
   double *at = to;
-  for (int k = 0; k < n; ++k) {
-    const int i = numbers[k];
+  for (int a = 0; a < n; ++a) {
+    const auto [role, k] = particle_[atoms[a]];
+    const bool wall = role == SphRole::solid;
     if (walls_to_ghosts_) {
-      *at++ = atom->p[i];
-      *at++ = wall_velocity_[i].x, *at++ = wall_velocity_[i].y, *at++ = wall_velocity_[i].z;
+      const Vector met = wall ? walls.met[k] : Vector{};
+      *at++ = wall ? walls.pressure[k] : 0.0;
+      *at++ = met.x, *at++ = met.y, *at++ = met.z;
     } else {
-      *at++ = atom->rho[i];
+      *at++ = role == SphRole::fluid ? scene_.fluid.density[k] : wall ? walls.density[k] : 0.0;
     }
   }
   return walls_to_ghosts_ ? 4 : 1;
 }
 
 void PairSphCoupled::unpack_comm(int n, int first, double *from) {
-  for (int i = first; i < first + n; ++i) {
-    if (!walls_to_ghosts_) {
-      atom->rho[i] = *from++;
-      if (role_[i] == SphRole::fluid) atom->p[i] = settings_.state.pressure(atom->rho[i]);
-      continue;
+  Solids &walls = scene_.solids[0];
+  const int size = walls_to_ghosts_ ? 4 : 1;
+  for (int i = first; i < first + n; ++i, from += size) {
+    const auto [role, k] = particle_[i];
+    if (walls_to_ghosts_) {
+      if (role != SphRole::solid) continue;
+      walls.pressure[k] = from[0];
+      walls.met[k] = vector(from + 1);
+    } else if (role == SphRole::fluid) {
+      scene_.fluid.density[k] = from[0];
+    } else if (role == SphRole::solid) {
+      walls.density[k] = from[0];
     }
-    const double p = *from++;
-    wall_velocity_[i] = vector(from);
-    from += 3;
-    if (role_[i] != SphRole::solid) continue;
-    atom->p[i] = p;
-    if (settings_.boundary == Boundary::extrapolated) atom->rho[i] = wall_density(settings_.state, p);
   }
-}
-
-/// Pressures of solid particles, and the records of all particles for the forces.
-void PairSphCoupled::wall_states() {
-  const int own = atom->nlocal, all = int(role_.size()), kernel = int(settings_.kernel);
-  const bool extrapolated = settings_.boundary == Boundary::extrapolated;
-  for (int i = 0; i < all; ++i) {
-    const Vector x = vector(atom->x[i]), v = vector(atom->v[i]);
-    records_[i] = role_[i] == SphRole::fluid ? force_record(x, v, atom->rho[i], atom->p[i]) : solid_record(x, {});
-  }
-  std::fill(sum_.begin(), sum_.end(), Quad{});
-  std::fill(rate_.begin(), rate_.end(), 0.0);
-  std::fill(velocity_sum_.begin(), velocity_sum_.end(), Vector{});
-  if (extrapolated) loops_->wall_sums[kernel](arguments(rows_.near_fluid));
-  for (int i = 0; i < own; ++i) {
-    if (role_[i] != SphRole::solid) continue;
-    velocity_[i] = wall_velocity_[i] = vector(atom->v[i]);
-    if (!extrapolated) {
-      atom->p[i] = settings_.state.pressure(atom->rho[i]);
-      continue;
-    }
-    const Quad &q = sum_[i];
-    const Body &body = solids_[std::size_t(solid_of_[i])]->body();
-    const WallState wall = wall_state(settings_, {q.w, rate_[i], {q.x, q.y, q.z}, velocity_sum_[i]}, velocity_[i],
-                                      body.acceleration_at(vector(atom->x[i]) - body.position));
-    atom->p[i] = wall.pressure;
-    atom->rho[i] = wall.density;
-    wall_velocity_[i] = wall.velocity;
-    sum_[i] = {};
-  }
-  walls_to_ghosts_ = true;
-  comm->forward_comm_pair(this);
-  for (int i = 0; i < all; ++i)
-    if (role_[i] == SphRole::solid) records_[i] = force_record(vector(atom->x[i]), wall_velocity_[i], atom->rho[i], atom->p[i]);
-}
-
-/// Accelerations over dt (s) into sum_.
-void PairSphCoupled::push(double dt) {
-  const int kernel = int(settings_.kernel), slip = settings_.no_slip ? 0 : 1;
-  const double per_mass = dt * settings_.mass();
-  lost_.viscous +=
-      per_mass * (loops_->force_pairs[kernel](arguments(rows_.inner)) + 0.5 * loops_->force_pairs[kernel](arguments(rows_.border)));
-  loops_->force_across[kernel][slip](arguments(rows_.of_fluid));
-  LoopArguments back = arguments(rows_.near_fluid);
-  back.velocity = velocity_.data();
-  lost_.boundary += per_mass * loops_->force_across[kernel][slip](back);
-}
-
-/// Accelerations of the contact potential into sum_, and its energy.
-void PairSphCoupled::repel() {
-  const int none = int(role_.size());
-  const double mass = settings_.mass(), solid = mass / settings_.state.density;
-  lost_.contact = 0.0;
-  with_kernel(settings_, [&](const auto &kernel) {
-    // Of the fluid particle.
-    const auto acceleration = [&](int fluid, int other, double &r, double &volumes) {
-      const Vector d = vector(atom->x[fluid]) - vector(atom->x[other]);
-      r = norm(d);
-      volumes = solid * mass / atom->rho[fluid];
-      return (contact_factor(settings_.contact, kernel, r, volumes, numbers_.at_spacing) / mass) * d;
-    };
-    double r, volumes;
-    rows_.repelling_fluid.each(none, [&](int i, int j) {
-      const Vector a = acceleration(i, j, r, volumes);
-      sum_[i] = {sum_[i].x + a.x, sum_[i].y + a.y, sum_[i].z + a.z, 0.0};
-      lost_.contact += contact_energy(settings_.contact, kernel, r, volumes, numbers_.at_spacing);
-    });
-    rows_.fluid_of_repelling.each(none, [&](int j, int i) {
-      const Vector a = acceleration(i, j, r, volumes);
-      sum_[j] = {sum_[j].x - a.x, sum_[j].y - a.y, sum_[j].z - a.z, 0.0};
-    });
-  });
 }
 
 void PairSphCoupled::compute(int eflag, int vflag) {
   if (eflag || vflag) ev_setup(eflag, vflag);
   else evflag = vflag_fdotr = 0;
-  for (FixSphBody *solid : solids_) solid->begin_forces(settings_.gravity);
-  wall_states();
-  push(update->setupflag ? 0.0 : update->dt);
-  if (settings_.contact.on()) repel();
-  const double mass = settings_.mass();
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (role_[i] == SphRole::none) continue;
-    const Vector by = mass * Vector{sum_[i].x, sum_[i].y, sum_[i].z};
-    atom->f[i][0] += by.x, atom->f[i][1] += by.y, atom->f[i][2] += by.z;
-    if (role_[i] == SphRole::fluid) continue;
-    FixSphBody *const solid = solids_[std::size_t(solid_of_[i])];
-    solid->add_force(by, cross(vector(atom->x[i]) - solid->body().position, by));
-  }
+  // In the set-up begin() has sorted the particles.
+  const bool moved = !update->setupflag;
+  if (moved && neighbor->ago == 0) sort_particles();
+  for (FixSphBody *solid : solids_) solid->begin_forces(scene_.settings.gravity);
+  load();
+  passes_->compute(scene_, moved ? update->dt : 0.0, Images{*this});
+  store(moved);
   if (evflag && eflag_global) eng_vdwl = energies().compression;
 }
 
 Energies PairSphCoupled::energies() const {
-  Energies e = lost_;
-  const double mass = settings_.mass();
-  for (int i = 0; i < atom->nlocal; ++i) {
-    if (!(atom->mask[i] & fluid_fix_->groupbit)) continue;
-    const Vector v = vector(atom->v[i]);
-    e.kinetic += 0.5 * mass * dot(v, v);
-    e.potential -= mass * dot(settings_.gravity, vector(atom->x[i]));
-    e.compression += mass * settings_.state.energy(atom->rho[i]);
-  }
+  Energies e = scene_.lost;
+  for (int i = 0; i < atom->nlocal; ++i)
+    if (atom->mask[i] & fluid_fix_->groupbit) add_energies(scene_.settings, vector(atom->x[i]), vector(atom->v[i]), atom->rho[i], e);
   return e;
 }

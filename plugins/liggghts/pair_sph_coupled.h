@@ -1,8 +1,8 @@
 // pair_style sph/coupled spacing DX sound_speed C ...: weakly compressible fluid with walls and rigid bodies, the terms of dembark/sph.
 //
-// fix nve/sph/coupled says which atoms are fluid and moves them; fix sph/wall and fix sph/body say which are solid. A step is that of
-// dembark/sph/solver.hpp: the fix has densities computed before the forces are. Ghosts get the new densities and the pressures of solid
-// particles within the step.
+// fix nve/sph/coupled says which atoms are fluid and moves them; fix sph/wall and fix sph/body say which are solid. The passes of a step
+// are those of dembark/sph/passes.hpp; here atoms become its scene, the engine's neighbours its rows, and ghosts get what the passes have
+// computed of their atoms on other ranks.
 #ifdef PAIR_CLASS
 
 PairStyle(sph / coupled, PairSphCoupled)
@@ -12,13 +12,14 @@ PairStyle(sph / coupled, PairSphCoupled)
 #ifndef LMP_PAIR_SPH_COUPLED_H
 #define LMP_PAIR_SPH_COUPLED_H
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "pair.h"
 
-#include "dembark/sph/ledger.hpp"
-#include "dembark/sph/particle_records.hpp"
+#include "dembark/sph/passes.hpp"
+#include "sph_films.h"
 #include "sph_rows.h"
 
 namespace LAMMPS_NS {
@@ -41,16 +42,21 @@ class PairSphCoupled : public Pair {
   /// The pair style of this run, alone or in hybrid/overlay; nullptr if there is none.
   static PairSphCoupled *find(class Force *);
 
-  const dembark::sph::Settings &fluid() const { return settings_; }
+  const dembark::sph::Settings &fluid() const { return scene_.settings; }
   /// At the beginning of a run, when there are ghosts and neighbours: checks, and pressures from the densities. first: no run was before.
   /// Collective.
   void begin(bool first);
-  /// Densities after dt (s), and shifts (m) if there is room for them. Collective.
-  void advance(double dt, double **shifts);
   /// Of this rank: what is stored, lost since the beginning.
   dembark::sph::Energies energies() const;
 
+  dembark_liggghts::SphFilms &films() { return films_; }
+  /// Number of a wall or body in the scene.
+  int number(const class FixSphBody *) const;
+
  private:
+  /// Sends what passes have computed to ghosts (dembark/sph/passes.hpp).
+  struct Images;
+
   [[noreturn]] void refuse(const std::string &what) const;
   void read(const std::vector<std::string> &words);
   void refuse_if_any(const std::string &line) const;
@@ -59,26 +65,18 @@ class PairSphCoupled : public Pair {
   std::string wrong_with(int i) const;
   std::string overlap() const;
   void sort_particles();
-  void resize();
-  dembark::sph::LoopArguments arguments(const dembark::sph::Rows &rows);
-  void wall_states();
-  void push(double dt);
-  void repel();
+  void load();
+  void store(bool moved);
 
   std::vector<std::string> words_;
-  dembark::sph::Settings settings_;
-  dembark::sph::LoopNumbers numbers_;
-  const dembark::sph::Loops *loops_;
-  dembark::sph::Energies lost_{};
+  dembark::sph::Scene scene_;
+  std::unique_ptr<dembark::sph::Passes> passes_;
+  dembark_liggghts::SphFilms films_;
   class FixNveSphCoupled *fluid_fix_ = nullptr;
-  std::vector<class FixSphBody *> solids_;
-  std::vector<dembark_liggghts::SphRole> role_;
-  std::vector<int> solid_of_;  // of each atom: its number in solids_, or -1
+  std::vector<class FixSphBody *> solids_;               // the bodies of the scene
+  std::vector<dembark_liggghts::SphParticle> particle_;  // of each atom
+  std::vector<int> atoms_[3];                            // of each role
   dembark_liggghts::SphRows rows_;
-  std::vector<dembark::sph::Record> records_;
-  std::vector<double> rate_;
-  std::vector<dembark::sph::Quad> sum_, shift_sum_;
-  std::vector<dembark::sph::Vector> velocity_, velocity_sum_, wall_velocity_;
   bool walls_to_ghosts_ = false;  // what pack_comm() sends: pressures and velocities of solids, else densities
 };
 

@@ -1,11 +1,11 @@
-// Films of water in slits between boxes of fix sph/body and at planes, dembark/sph/slits.hpp, on pressures that are spread over ranks.
+// Films of water in slits between boxes of fix sph/body and at planes, dembark/sph/slits.hpp: pressures that are spread over ranks.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "dembark/sph/slits.hpp"
 #include "pointers.h"
+#include "sph_rows.h"
 
 namespace LAMMPS_NS {
 class FixSphBody;
@@ -15,22 +15,20 @@ namespace dembark_liggghts {
 
 class SphFilms : protected LAMMPS_NS::Pointers {
  public:
-  explicit SphFilms(LAMMPS_NS::LAMMPS *lmp) : Pointers(lmp) {}
+  SphFilms(LAMMPS_NS::LAMMPS *lmp, dembark::sph::Scene &scene) : Pointers(lmp), scene_(scene) {}
 
-  /// Boxes of these bodies with half edges `half` (m), the lattices of their particles. Throws std::invalid_argument with the one clear
-  /// line about a box whose particles are not that lattice. Collective.
-  void begin(const std::vector<LAMMPS_NS::FixSphBody *> &fixes, const std::vector<std::string> &names,
-             const std::vector<dembark::sph::Vector> &half, const std::vector<dembark::sph::LatticePlane> &planes);
-  /// Forces as they are now, at xi = `share`: loads of the bodies, which all ranks add alike. Collective.
-  void push(double share);
+  /// No films.
+  void clear();
+  /// Boxes of these bodies, which have those numbers in the scene, with half edges `half` (m), the lattices of their particles; planes; the
+  /// share xi. Throws std::invalid_argument with the one clear line about a box whose particles are not that lattice. Collective.
+  void begin(const std::vector<LAMMPS_NS::FixSphBody *> &fixes, const std::vector<std::string> &names, const std::vector<int> &numbers,
+             const std::vector<dembark::sph::Vector> &half, const std::vector<dembark::sph::LatticePlane> &planes, double share);
+  /// Pa, of all particles of the boxes. atoms: what the atoms of this rank are in the scene. Collective.
+  const std::vector<double> &pressures(const std::vector<SphParticle> &atoms);
 
  private:
-  /// Place in the lattice of a particle at `arm` from the centre, or -1 beside it.
-  int place(const dembark::sph::LatticeBox &box, const dembark::sph::Vector &arm) const;
-
+  dembark::sph::Scene &scene_;
   std::vector<LAMMPS_NS::FixSphBody *> fixes_;
-  dembark::sph::Slits slits_;
-  std::vector<dembark::sph::Body> bodies_;
   std::vector<double> pressures_;
 };
 

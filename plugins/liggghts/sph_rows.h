@@ -1,72 +1,87 @@
-// The engine's list of neighbours, sorted into the rows of dembark/sph/loops.hpp by what the particles are.
+// The engine's list of neighbours, sorted into the rows of dembark/sph/scene.hpp by what the particles are.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
-#include "dembark/sph/cells.hpp"
+#include "dembark/sph/scene.hpp"
 
 namespace dembark_liggghts {
 
 enum class SphRole : unsigned char {
-  none,       ///< takes no part
   fluid,      ///< of the fluid
   solid,      ///< of a wall or body that acts by pressure
   repelling,  ///< of a body that acts by the contact potential
+  none,       ///< takes no part
 };
 
-/// Rows of the atoms 0 ... n - 1 of this rank; neighbours are its own atoms and ghosts. Of two ranks each has the pairs across their
-/// border.
-struct SphRows {
-  dembark::sph::Rows inner;               ///< fluid with fluid of this rank, each pair once
-  dembark::sph::Rows border;              ///< fluid with ghosts of fluid
-  dembark::sph::Rows of_fluid;            ///< solid particles near fluid ones
-  dembark::sph::Rows near_fluid;          ///< fluid particles near solid ones
-  dembark::sph::Rows repelling_fluid;     ///< repelling particles near fluid ones
-  dembark::sph::Rows fluid_of_repelling;  ///< fluid particles near repelling ones
+/// What an atom is in the scene.
+struct SphParticle {
+  SphRole role = SphRole::none;
+  int number = -1;  ///< among those of its role, those of this rank first
+};
 
-  /// own: atoms of this rank. each_pair(pair): calls pair(i, j) for all pairs of the list, i < own. none: the number that fills up rows.
+class SphRows {
+ public:
+  /// each_pair(pair): calls pair(i, j) for all pairs of the list; i is of this rank, and own are the atoms 0 ... own - 1. Of two ranks each
+  /// has the pairs across their border.
   template <class EachPair>
-  void build(const std::vector<SphRole>& role, int own, int none, const EachPair& each_pair) {
-    dembark::sph::Rows* const all[] = {&inner, &border, &of_fluid, &near_fluid, &repelling_fluid, &fluid_of_repelling};
-    for (dembark::sph::Rows* rows : all) {
-      rows->begin = 0;
-      rows->end = own;
-      rows->start.assign(std::size_t(own) + 1, 0);
+  void build(const std::vector<SphParticle>& atoms, int own, dembark::sph::Scene& scene, const EachPair& each_pair) {
+    dembark::sph::FluidParticles& fluid = scene.fluid;
+    fluid.pairs.resize(1);
+    begin(pairs, fluid.pairs[0], fluid.size());
+    begin(border, fluid.border, fluid.size());
+    for (std::size_t s = 0; s < 2; ++s) {
+      dembark::sph::Solids& set = scene.solids[s];
+      set.of_fluid.resize(1);
+      set.near_fluid.resize(1);
+      begin(of_fluid + 2 * s, set.of_fluid[0], fluid.size());
+      begin(near_fluid + 2 * s, set.near_fluid[0], set.size());
     }
-    each_pair([&](int i, int j) { sort(role, own, i, j, [](dembark::sph::Rows& rows, int k, int) { ++rows.start[std::size_t(k) + 1]; }); });
-    for (dembark::sph::Rows* rows : all) {
+    each_pair(
+        [&](int i, int j) { sort(atoms, own, i, j, [this](std::size_t which, int k, int) { ++at_[which]->start[std::size_t(k) + 1]; }); });
+    for (std::size_t which = 0; which < kinds; ++which) {
+      dembark::sph::Rows& rows = *at_[which];
       // Whole packs of four.
-      for (int k = 0; k < own; ++k) rows->start[k + 1] = rows->start[k] + (rows->start[k + 1] + 3) / 4 * 4;
-      rows->neighbour.assign(std::size_t(rows->start[own]), none);
-      rows->end = own;
+      for (std::size_t k = 1; k < rows.start.size(); ++k) rows.start[k] = rows.start[k - 1] + (rows.start[k] + 3) / 4 * 4;
+      const bool of_solids = which == of_fluid || which == of_fluid + 2;
+      rows.neighbour.assign(std::size_t(rows.start.back()),
+                            of_solids ? scene.solids[(which - of_fluid) / 2].with_images() : fluid.with_images());
+      next_[which].assign(rows.start.begin(), rows.start.end() - 1);
     }
-    fill_.assign(6 * std::size_t(own), 0);
     each_pair([&](int i, int j) {
-      sort(role, own, i, j, [&](dembark::sph::Rows& rows, int k, int neighbour) {
-        std::size_t which = 0;
-        while (all[which] != &rows) ++which;
-        rows.neighbour[std::size_t(rows.start[k] + fill_[which * std::size_t(own) + std::size_t(k)]++)] = neighbour;
+      sort(atoms, own, i, j, [this](std::size_t which, int k, int neighbour) {
+        at_[which]->neighbour[std::size_t(next_[which][std::size_t(k)]++)] = neighbour;
       });
     });
   }
 
  private:
-  template <class Put>
-  void sort(const std::vector<SphRole>& role, int own, int i, int j, const Put& put) {
-    const SphRole a = role[i], b = role[j];
-    if (a == SphRole::fluid && b == SphRole::fluid) put(j < own ? inner : border, i, j);
-    else if (a == SphRole::fluid) across(b, own, i, j, put);
-    else if (b == SphRole::fluid) across(a, own, j, i, put);
+  static constexpr std::size_t pairs = 0, border = 1, of_fluid = 2, near_fluid = 3, kinds = 6;  // the latter two of both kinds of solids
+
+  void begin(std::size_t which, dembark::sph::Rows& rows, int count) {
+    at_[which] = &rows;
+    rows.begin = 0;
+    rows.end = count;
+    rows.start.assign(std::size_t(count) + 1, 0);
   }
   template <class Put>
-  void across(SphRole solid, int own, int fluid, int other, const Put& put) {
-    if (solid == SphRole::none) return;
-    const bool repels = solid == SphRole::repelling;
-    if (fluid < own) put(repels ? repelling_fluid : of_fluid, fluid, other);
-    if (other < own) put(repels ? fluid_of_repelling : near_fluid, other, fluid);
+  static void sort(const std::vector<SphParticle>& atoms, int own, int i, int j, const Put& put) {
+    const SphParticle &a = atoms[std::size_t(i)], &b = atoms[std::size_t(j)];
+    if (a.role == SphRole::fluid && b.role == SphRole::fluid) put(j < own ? pairs : border, a.number, b.number);
+    else if (a.role == SphRole::fluid) across(a, b, true, j < own, put);
+    else if (b.role == SphRole::fluid) across(b, a, j < own, true, put);
+  }
+  template <class Put>
+  static void across(const SphParticle& fluid, const SphParticle& solid, bool own_fluid, bool own_solid, const Put& put) {
+    if (solid.role == SphRole::none) return;
+    const std::size_t kind = solid.role == SphRole::repelling ? 2 : 0;
+    if (own_fluid) put(of_fluid + kind, fluid.number, solid.number);
+    if (own_solid) put(near_fluid + kind, solid.number, fluid.number);
   }
 
-  std::vector<int> fill_;
+  dembark::sph::Rows* at_[kinds] = {};
+  std::vector<int> next_[kinds];  // place of the next neighbour of each row
 };
 
 }  // namespace dembark_liggghts

@@ -11,18 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "dembark/sph/best_loops.hpp"
 #include "dembark/sph/solver.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace dembark;
 using namespace dembark::sph;
-
-namespace dembark::sph {
-#if defined(__x86_64__)
-extern const Loops avx2_loops;
-#endif
-}  // namespace dembark::sph
 
 namespace {
 
@@ -31,13 +26,6 @@ using Points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::dev
 using Column = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
 using Rows3 = nb::ndarray<nb::numpy, double, nb::shape<-1, 3>>;
 typedef std::array<double, 3> Three;
-
-const Loops& loops_of_processor(const std::string& instruction_set) {
-#if defined(__x86_64__)
-  if (instruction_set == "best" && __builtin_cpu_supports("avx2")) return avx2_loops;
-#endif
-  return portable_loops();
-}
 
 int option(const std::string& what, const std::vector<std::string>& names, const std::string& word) {
   const auto found = std::find(names.begin(), names.end(), word);
@@ -129,7 +117,7 @@ void bind_sph(nb::module_& m) {
                                     threads,
                                     slit_pressure};
             new (self) Solver(settings, vectors(positions), std::vector<double>(densities.data(), densities.data() + densities.size()),
-                              vectors(velocities), loops_of_processor(instruction_set));
+                              vectors(velocities), instruction_set == "best" ? best_loops() : portable_loops());
           },
           "positions"_a, "densities"_a, "velocities"_a, "dimension"_a, "spacing"_a, "smoothing"_a, "kernel"_a, "density"_a, "sound_speed"_a,
           "gamma"_a, "tension"_a, "alpha"_a, "delta"_a, "gravity"_a, "boundary"_a, "no_slip"_a, "shifting"_a, "contact_stiffness"_a,

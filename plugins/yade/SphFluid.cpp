@@ -2,7 +2,6 @@
 #include "SphFluid.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <stdexcept>
@@ -11,16 +10,11 @@
 #include <pkg/dem/NewtonIntegrator.hpp>
 
 #include "ContactView.hpp"
+#include "dembark/sph/best_loops.hpp"
 #include "SavedNumbers.hpp"
 #include "engine_access.hpp"
 #include "engine_order.hpp"
 #include "report.hpp"
-
-namespace dembark::sph {
-#if defined(__x86_64__)
-extern const Loops avx2_loops;
-#endif
-}  // namespace dembark::sph
 
 namespace yade {
 
@@ -32,13 +26,6 @@ using dembark_yade::vec;
 namespace sph = ::dembark::sph;
 
 namespace sph_fluid {
-
-const sph::Loops& loops() {
-#if defined(__x86_64__)
-	if (__builtin_cpu_supports("avx2")) return sph::avx2_loops;
-#endif
-	return sph::portable_loops();
-}
 
 /// A message of the headers with the names that attributes have here: soundSpeed for sound_speed.
 std::string inYade(const std::string& line) {
@@ -55,20 +42,6 @@ int choice(const std::string& name, const std::vector<std::string>& names, const
 	if (found == names.end()) fail("SphFluid." + name + " is '" + word + "'; it must be '" + names[0] + "' or '" + names[1] + "'");
 	return static_cast<int>(found - names.begin());
 }
-
-std::array<int, 3> counts(const Vector3r& edges, double spacing) {
-	std::array<int, 3> count{};
-	for (int k = 0; k < 3; ++k) {
-		count[k] = static_cast<int>(std::lround(edges[k] / spacing));
-		if (count[k] < 1 || std::abs(count[k] * spacing - edges[k]) > 1e-3 * spacing)
-			fail("SphFluid: addBox: an edge of " + text(edges[k]) + " m; it must be a whole number of the spacing, " +
-			     text(spacing) + " m");
-	}
-	return count;
-}
-
-/// Places in `ways` of what is known about a body.
-enum { way, turn, velocity, spin, numbers };
 
 }  // namespace sph_fluid
 
@@ -142,7 +115,7 @@ sph::Solver& SphFluid::fluid() {
 			rho.push_back(s.state.density_at(firstPressures[i]));
 		}
 		if (x.empty()) fail("SphFluid: there is no fluid; give it particles by addParticles");
-		auto        made = std::make_unique<sph::Solver>(s, std::move(x), std::move(rho), std::move(v), sph_fluid::loops());
+		auto        made = std::make_unique<sph::Solver>(s, std::move(x), std::move(rho), std::move(v), sph::best_loops());
 		std::size_t at   = 0;
 		for (std::size_t k = 0; k < solidIds.size(); ++k) {
 			sph::Body body;
@@ -153,7 +126,7 @@ sph::Solver& SphFluid::fluid() {
 			made->add(body, points);
 		}
 		for (std::size_t k = 0; k < boxNumbers.size(); ++k)
-			made->add_box(boxNumbers[k], vec(boxEdges[k]), sph_fluid::counts(boxEdges[k], spacing));
+			made->add_box(boxNumbers[k], vec(boxEdges[k]), sph::lattice_counts(vec(boxEdges[k]), spacing));
 		for (std::size_t k = 0; k + 1 < planes.size(); k += 2) made->add_plane(vec(planes[k]), vec(planes[k + 1]));
 		if (!savedState.empty()) made->restore(dembark_yade::decode(savedState));
 		savedState.clear();
@@ -162,25 +135,6 @@ sph::Solver& SphFluid::fluid() {
 		fail(sph_fluid::inYade(wrong.what()));
 	}
 	return *solver;
-}
-
-/// Velocities of the bodies over the fluid's last step, and their accelerations at its beginning.
-void SphFluid::follow() {
-	using namespace sph_fluid;
-	for (std::size_t k = 0; k < solidIds.size(); ++k) {
-		if (solidIds[k] < 0) continue;
-		sph::Body& body = solver->body(static_cast<int>(k));
-		Vector3r*  own  = &ways[numbers * k];
-		place(k, body);
-		const sph::Vector v = body.velocity, w = body.spin;
-		body.acceleration      = (1.0 / elapsed) * (v - vec(own[velocity]));
-		body.spin_acceleration = (1.0 / elapsed) * (w - vec(own[spin]));
-		body.velocity          = (1.0 / elapsed) * vec(own[way]);
-		body.spin              = (1.0 / elapsed) * vec(own[turn]);
-		own[way] = own[turn] = Vector3r::Zero();
-		own[velocity]        = vec(v);
-		own[spin]            = vec(w);
-	}
 }
 
 void SphFluid::push() {
@@ -201,23 +155,26 @@ void SphFluid::action() {
 	if (now != gravity) fail("SphFluid: NewtonIntegrator.gravity has changed since the fluid began; that is not possible");
 	try {
 		if (passed < 0) {
-			ways.assign(numbers * solidIds.size(), Vector3r::Zero());
+			motions.clear();
 			for (std::size_t k = 0; k < solidIds.size(); ++k) {
-				place(k, own.body(static_cast<int>(k)));
-				ways[numbers * k + velocity] = vec(own.body(static_cast<int>(k)).velocity);
-				ways[numbers * k + spin]     = vec(own.body(static_cast<int>(k)).spin);
+				sph::Body& body = own.body(static_cast<int>(k));
+				place(k, body);
+				motions.push_back({{}, {}, body.velocity, body.spin});
 			}
 			own.prepare();
 			passed = 0;
 		} else if (!again) {
 			elapsed += lastLength;
 			for (std::size_t k = 0; k < solidIds.size(); ++k)
-				if (const Body* const body = bodyOf(k)) {
-					ways[numbers * k + way] += lastLength * body->state->vel;
-					ways[numbers * k + turn] += lastLength * body->state->angVel;
-				}
+				if (const Body* const body = bodyOf(k))
+					motions[k].add(lastLength, vec(body->state->vel), vec(body->state->angVel));
 			if (++passed >= substeps) {
-				follow();
+				for (std::size_t k = 0; k < solidIds.size(); ++k) {
+					if (solidIds[k] < 0) continue;
+					sph::Body& body = own.body(static_cast<int>(k));
+					place(k, body);
+					motions[k].drive(body, elapsed);
+				}
 				own.step(elapsed);
 				elapsed = 0.0;
 				passed  = 0;
@@ -239,8 +196,16 @@ void SphFluid::action() {
 
 void SphFluid::preSave(SphFluid&) {
 	if (solver && passed >= 0) savedState = dembark_yade::encode(solver->state());
+	ways.clear();
+	for (const sph::DrivenMotion& m : motions)
+		for (const sph::Vector& v : {m.way, m.turn, m.velocity, m.spin}) ways.push_back(vec(v));
 }
 
-void SphFluid::postLoad(SphFluid&) { solver.reset(); }
+void SphFluid::postLoad(SphFluid&) {
+	solver.reset();
+	motions.clear();
+	for (std::size_t k = 0; k + 3 < ways.size(); k += 4)
+		motions.push_back({vec(ways[k]), vec(ways[k + 1]), vec(ways[k + 2]), vec(ways[k + 3])});
+}
 
 }  // namespace yade

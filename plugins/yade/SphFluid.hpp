@@ -112,10 +112,10 @@ private:
 	const Body*              bodyOf(std::size_t k) const;
 	std::size_t              numberOf(int id) const;
 	void                     place(std::size_t k, ::dembark::sph::Body& body) const;
-	void                     follow();
 	void                     push();
 
-	std::unique_ptr<::dembark::sph::Solver> solver;
+	std::unique_ptr<::dembark::sph::Solver>   solver;
+	std::vector<::dembark::sph::DrivenMotion> motions;  // of each wall and body
 };
 REGISTER_SERIALIZABLE(SphFluid);
 

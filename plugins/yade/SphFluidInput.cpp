@@ -20,8 +20,6 @@ namespace py  = boost::python;
 
 namespace sph_fluid {
 
-std::array<int, 3> counts(const Vector3r& edges, double spacing);
-
 [[noreturn]] void refuse(const std::string& what) { fail("SphFluid: " + what + " must be a list of points, each of three numbers (m)"); }
 
 /// Points of any sequence of vectors, tuples or rows of an array.
@@ -144,8 +142,13 @@ int SphFluid::addBody(int id, const py::object& given) {
 int SphFluid::addBox(int id, const Vector3r& edges) {
 	mustFit(id, "addBox: body " + std::to_string(id));
 	if (dimension != 3) fail("SphFluid: addBox: boxes are for three dimensions; use addBody");
-	const std::array<int, 3> count = sph_fluid::counts(edges, spacing);
-	std::vector<Vector3r>    points;
+	std::array<int, 3> count{};
+	try {
+		count = sph::lattice_counts(vec(edges), spacing);
+	} catch (const std::invalid_argument& wrong) {
+		fail(std::string("SphFluid: addBox: ") + wrong.what());
+	}
+	std::vector<Vector3r> points;
 	for (int i = 0; i < count[0]; ++i)
 		for (int j = 0; j < count[1]; ++j)
 			for (int k = 0; k < count[2]; ++k)

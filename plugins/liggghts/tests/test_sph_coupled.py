@@ -97,7 +97,7 @@ def test_resumes_to_the_bit(style: str, ranks: int, tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "step": ("timestep ", "timestep 1", "the time step must be at most 0.6 h/sound_speed"),
+    "step": ("timestep ", "timestep 1", "the time step must be > 0 and at most 0.6 h/sound_speed"),
     "mass": ("set group all mass 0.4", "set group all mass 0.5", "of the fluid has the mass 0.5 kg where density * spacing^2 is 0.4 kg"),
     "density": ("meso_rho 1000", "meso_rho 0", "of the fluid has the density 0 kg/m^3"),
     "ghosts": ("communicate single vel yes", "communicate single vel no", "communicate single vel yes"),

@@ -10,7 +10,8 @@
 // Units SI; in the plane masses and forces are those of a metre of depth, and bodies turn about z.
 //
 // Driven bodies belong to an engine that moves them under the forces they get here. Before the step from t to t + dt they are given their
-// places at t + dt, their mean velocities on the way there and their accelerations at t: those that kick - drift - kick itself has.
+// places at t + dt, their mean velocities on the way there and their accelerations at t (DrivenMotion): those that kick - drift - kick
+// itself has.
 #pragma once
 
 #include <cmath>
@@ -57,6 +58,19 @@ struct Body {
   Vector velocity_at(const Vector& arm) const { return velocity + cross(spin, arm); }
   Vector acceleration_at(const Vector& arm) const { return acceleration + cross(spin_acceleration, arm) + cross(spin, cross(spin, arm)); }
 
+  /// First half of a step of dt (s), up to where forces are computed. Returns power(), of this half of the step.
+  double first_half(double dt) {
+    kick(0.5 * dt);
+    const double now = power();
+    drift(dt);
+    return now;
+  }
+  /// Second half, by the accelerations of the new forces.
+  double second_half(double dt) {
+    const double now = power();
+    kick(0.5 * dt);
+    return now;
+  }
   void kick(double dt) {
     if (driven) return;
     velocity += dt * acceleration;
@@ -78,6 +92,10 @@ struct Body {
     const Vector s = orientation.inverse()(spin), gyroscopic = cross(scaled(s), s);
     spin_acceleration += orientation({gyroscopic.x / inertia.x, gyroscopic.y / inertia.y, gyroscopic.z / inertia.z});
   }
+  /// W, that a moved wall, or what acts on a free body but gravity and the fluid, puts in.
+  double power() const { return dot(film + (free ? load : -force), velocity) + dot(film_torque + (free ? load_torque : -torque), spin); }
+  /// J, of a free body; 0 of others.
+  double energy(const Vector& gravity) const { return free ? kinetic_energy() - mass * dot(gravity, position) : 0.0; }
   /// J, of translation and rotation.
   double kinetic_energy() const {
     if (!free) return 0.0;
@@ -113,6 +131,27 @@ struct Body {
     turn(&Vector::y, 0.5 * dt);
     turn(&Vector::x, 0.5 * dt);
     spin = orientation({l.x / inertia.x, l.y / inertia.y, l.z / inertia.z});
+  }
+};
+
+/// How an engine has moved a driven body since the fluid's last step, in one step of its own or several.
+struct DrivenMotion {
+  Vector way{}, turn{};       ///< m, rad
+  Vector velocity{}, spin{};  ///< m/s, rad/s, as the fluid's last step began
+
+  /// A step of dt (s) of the engine at these velocities.
+  void add(double dt, const Vector& v, const Vector& w) {
+    way += dt * v;
+    turn += dt * w;
+  }
+  /// Before a step of dt (s) of the fluid: the body, which has place and velocities as the engine has them now, gets those of the step.
+  void drive(Body& body, double dt) {
+    const Vector v = body.velocity, w = body.spin;
+    body.acceleration = (1.0 / dt) * (v - velocity);
+    body.spin_acceleration = (1.0 / dt) * (w - spin);
+    body.velocity = (1.0 / dt) * way;
+    body.spin = (1.0 / dt) * turn;
+    *this = {{}, {}, v, w};
   }
 };
 

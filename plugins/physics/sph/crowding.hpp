@@ -25,7 +25,7 @@
 #include <vector>
 
 #include "cells.hpp"
-#include "particle_records.hpp"
+#include "scene.hpp"
 
 namespace dembark::sph {
 
@@ -80,5 +80,17 @@ class Crowding {
   int of_nearest_ = -1;
   std::vector<double> weight_;
 };
+
+/// Of all fluid particles of this process.
+inline Crowding crowding(const Scene& scene) {
+  const FluidParticles& fluid = scene.fluid;
+  Crowding all(scene.settings, std::size_t(fluid.size()));
+  const auto own = [&](int i) { return fluid.position[std::size_t(i)]; };
+  for (const Rows& rows : fluid.pairs) all.add(rows, fluid.with_images(), true, own, own);
+  all.add(fluid.border, fluid.with_images(), false, own, own);
+  for (const Solids& set : scene.solids)
+    for (const Rows& rows : set.of_fluid) all.add(rows, set.with_images(), false, own, [&](int k) { return set.position[std::size_t(k)]; });
+  return all;
+}
 
 }  // namespace dembark::sph

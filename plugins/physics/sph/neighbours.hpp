@@ -7,25 +7,18 @@
 #include <utility>
 #include <vector>
 
-#include "parallel.hpp"
-#include "solids.hpp"
+#include "scene.hpp"
 
 namespace dembark::sph {
-
-/// The fluid's particles, in the order of their cells.
-struct FluidParticles {
-  std::vector<Vector> position, velocity, acceleration, shift;  ///< m, m/s, m/s^2, m
-  std::vector<double> density, pressure;                        ///< kg/m^3, Pa
-  std::vector<int> id;                                          ///< number as they were given
-
-  int size() const { return int(id.size()); }
-};
 
 class Neighbours {
  public:
   /// Sorts the fluid and finds all pairs within `reach` (m). Throws std::runtime_error when particles are spread too far.
-  void build(FluidParticles& fluid, std::vector<Solids>& solids, double reach, int threads) {
-    set_grid(fluid, solids, reach);
+  void build(Scene& scene, double reach) {
+    FluidParticles& fluid = scene.fluid;
+    std::vector<Solids>& solids = scene.solids;
+    const int threads = scene.settings.threads;
+    const Vector far = set_grid(fluid, solids, reach);
     order_.sort(grid_, fluid.position);
     const std::vector<int>& members = order_.members();
     permute(members, fluid.position);
@@ -38,9 +31,10 @@ class Neighbours {
     at_build_ = fluid.position;
     solids_at_build_.clear();
     const int n = fluid.size(), slabs = (grid_.layers() + 1) / 2, layer = grid_.cells_of_layer();
-    pairs_.resize(std::size_t(slabs));
-    for (int s = 0; s < slabs; ++s) pairs_[s].clear(order_.begin(2 * s * layer), s + 1 < slabs ? order_.begin(2 * (s + 1) * layer) : n);
-    parallel_for(slabs, threads, [&](int s) { pair_rows(grid_, order_, fluid.position, n, pairs_[s]); });
+    std::vector<Rows>& pairs = fluid.pairs;
+    pairs.resize(std::size_t(slabs));
+    for (int s = 0; s < slabs; ++s) pairs[s].clear(order_.begin(2 * s * layer), s + 1 < slabs ? order_.begin(2 * (s + 1) * layer) : n);
+    parallel_for(slabs, threads, [&](int s) { pair_rows(grid_, order_, fluid.position, n, pairs[s]); });
     for (Solids& set : solids) {
       solids_at_build_.push_back(set.position);
       near_.clear();
@@ -48,41 +42,40 @@ class Neighbours {
         if (inside(set.position[k], reach)) near_.push_back(k);
       sorted_.resize(near_.size());
       for (std::size_t k = 0; k < near_.size(); ++k) sorted_[k] = set.position[near_[k]];
-      set.order.sort(grid_, sorted_);
+      near_order_.sort(grid_, sorted_);
       std::vector<int> numbers(near_.size());
-      for (std::size_t k = 0; k < near_.size(); ++k) numbers[k] = near_[set.order.members()[k]];
+      for (std::size_t k = 0; k < near_.size(); ++k) numbers[k] = near_[near_order_.members()[k]];
       for (std::size_t k = 0; k < near_.size(); ++k) sorted_[k] = set.position[numbers[k]];
-      set.of_fluid.resize(pairs_.size());
+      set.of_fluid.resize(pairs.size());
       parallel_for(slabs, threads, [&](int s) {
         Rows& rows = set.of_fluid[s];
-        rows.clear(pairs_[s].begin, pairs_[s].end);
-        all_rows(grid_, fluid.position, set.order, sorted_, numbers.data(), set.size(), rows);
+        rows.clear(pairs[s].begin, pairs[s].end);
+        all_rows(grid_, fluid.position, near_order_, sorted_, numbers.data(), set.size(), rows);
       });
+      set.near_fluid.resize((std::size_t(set.size()) + block - 1) / block);
       parallel_for(int(set.near_fluid.size()), threads, [&](int b) {
         Rows& rows = set.near_fluid[b];
-        rows.clear(b * Solids::block, std::min((b + 1) * Solids::block, set.size()));
+        rows.clear(b * block, std::min((b + 1) * block, set.size()));
         for (int k = rows.begin; k < rows.end; ++k) {
           if (inside(set.position[k], reach)) append_row(grid_, set.position[k], order_, fluid.position, nullptr, rows.neighbour);
           rows.end_row(n);
         }
       });
     }
+    scene.resize(far);
     fresh_ = true;
     ++builds_;
   }
 
   /// Whether particles may have moved more than `skin` (m) towards each other since.
-  bool outdated(const FluidParticles& fluid, const std::vector<Solids>& solids, double skin) const {
+  bool outdated(const Scene& scene, double skin) const {
     if (!fresh_) return true;
-    double most = farthest(fluid.position, at_build_);
-    for (std::size_t s = 0; s < solids.size(); ++s) most = std::max(most, farthest(solids[s].position, solids_at_build_[s]));
+    double most = farthest(scene.fluid.position, at_build_);
+    for (std::size_t s = 0; s < scene.solids.size(); ++s) most = std::max(most, farthest(scene.solids[s].position, solids_at_build_[s]));
     // As a difference that is no number compares: such particles are found by their speed.
     return 4.0 * most > skin * skin;
   }
   void forget() { fresh_ = false; }
-  const std::vector<Rows>& pairs() const { return pairs_; }
-  /// A place (m) beyond the reach of all particles.
-  const Vector& far() const { return far_; }
   long builds() const { return builds_; }
 
  private:
@@ -100,7 +93,8 @@ class Neighbours {
     }
     return most;
   }
-  void set_grid(const FluidParticles& fluid, const std::vector<Solids>& solids, double reach) {
+  /// Returns a place (m) beyond the reach of all particles.
+  Vector set_grid(const FluidParticles& fluid, const std::vector<Solids>& solids, double reach) {
     const double none = std::numeric_limits<double>::infinity();
     Vector low{none, none, none}, high{-none, -none, -none};
     const auto take = [&](const Vector& p) {
@@ -113,7 +107,7 @@ class Neighbours {
     high_ = high;
     for (const Solids& set : solids)
       for (const Vector& p : set.position) take(p);
-    far_ = high + Vector{100.0 * reach, 0.0, 0.0};
+    return high + Vector{100.0 * reach, 0.0, 0.0};
   }
 
   /// Whether p may be near the fluid at all.
@@ -122,13 +116,14 @@ class Neighbours {
            p.z < high_.z + reach;
   }
 
+  static constexpr int block = 256;  // of rows of solid particles
+
   Grid grid_;
-  CellOrder order_;
-  std::vector<Rows> pairs_;
+  CellOrder order_, near_order_;
   std::vector<Vector> at_build_, sorted_;
   std::vector<int> near_;
   std::vector<std::vector<Vector>> solids_at_build_;
-  Vector low_{}, high_{}, far_{};
+  Vector low_{}, high_{};
   bool fresh_ = false;
   long builds_ = 0;
 };

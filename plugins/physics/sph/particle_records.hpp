@@ -2,7 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <string>
 
+#include "../keyword_reader.hpp"
+#include "ledger.hpp"
 #include "loops.hpp"
 #include "settings.hpp"
 
@@ -25,21 +28,9 @@ inline Record force_record(const Vector& x, const Vector& v, double rho, double 
 /// Fills up rows: beyond the reach of all.
 inline Record far_record(const Vector& far) { return {far.x, far.y, far.z, 0.0, 0.0, 0.0, 0.0, 1.0}; }
 
-/// What the fluid meets at a solid particle.
-struct WallState {
-  double pressure = 0.0, density = 0.0;  ///< Pa, kg/m^3
-  Vector velocity{};                     ///< m/s, of viscosity
-};
-
 /// Density of the solid at the pressure p (Pa). Deep under tension no density has this pressure: the wall's is that of the fluid at rest.
 inline double wall_density(const Tait& state, double p) {
   return p != 0.0 && p > -0.5 * state.stiffness() ? state.density_at(p) : state.density;
-}
-
-/// Of a particle with the velocity and the acceleration of its body there.
-inline WallState wall_state(const Settings& s, const WallSums& sums, const Vector& velocity, const Vector& acceleration) {
-  const double p = wall_pressure(sums, s.gravity - acceleration, s.state.tension);
-  return {p, wall_density(s.state, p), wall_velocity(sums, velocity)};
 }
 
 /// Density of a dynamic boundary particle after dt (s) at the rate (kg/m^3/s). Walls do not pull.
@@ -62,6 +53,27 @@ struct LoopNumbers {
 inline double fluid_density(const Settings& s, const LoopNumbers& numbers, double rho, double rate, double dt) {
   const double next = rho + dt * rate;
   return s.state.tension ? next : std::max(next, numbers.spray);
+}
+
+/// First half of a step of dt (s) of a fluid particle, up to where the forces are computed: kick by `kick` (m/s), drift, and its shift (m).
+inline void first_half(Vector& x, Vector& v, const Vector& kick, const Vector& shift, double dt) {
+  v += kick;
+  x += dt * v + shift;
+}
+
+/// Fluid that is not has blown up; nor is a speed that is no number.
+inline bool slower_than_sound(const Settings& s, const Vector& v) { return dot(v, v) <= s.state.sound_speed * s.state.sound_speed; }
+/// What a message says of a particle that moves so.
+inline std::string too_fast(const Settings& s, const Vector& v) {
+  return "moves at " + keywords::text(norm(v)) + " m/s, faster than sound (" + keywords::text(s.state.sound_speed) +
+         " m/s); take a larger sound_speed, a shorter step or thicker walls";
+}
+
+/// Adds the energies of a fluid particle.
+inline void add_energies(const Settings& s, const Vector& x, const Vector& v, double rho, Energies& e) {
+  e.kinetic += 0.5 * s.mass() * dot(v, v);
+  e.potential -= s.mass() * dot(s.gravity, x);
+  e.compression += s.mass() * s.state.energy(rho);
 }
 
 /// Calls work(kernel) with the kernel of the settings.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "contact_potential.hpp"
 #include "kernels.hpp"
@@ -36,6 +37,14 @@ struct Settings {
   /// Largest stable time step (s) of sound: the highest frequency of the lattice is below 2.2 c_0/h, and 2 over it is the limit of the
   /// scheme, kick - drift - kick; viscosity and diffusion take some of it.
   double longest_step() const { return 0.6 * h() / state.sound_speed; }
+
+  /// The one clear line about a step of dt (s) that is not stable; "": it is.
+  std::string step_error(double dt) const {
+    const double most = longest_step();
+    if (dt > 0.0 && dt <= most * (1.0 + 1e-9)) return "";
+    return "the time step must be > 0 and at most 0.6 h/sound_speed = " + std::to_string(1e3 * most) + " ms, not " +
+           std::to_string(1e3 * dt) + " ms";
+  }
 
   /// The one clear line about what is wrong with these settings, or nullptr.
   const char* error() const {

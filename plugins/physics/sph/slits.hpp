@@ -31,6 +31,7 @@
 #include <limits>
 #include <vector>
 
+#include "../keyword_reader.hpp"
 #include "solids.hpp"
 
 namespace dembark::sph {
@@ -43,7 +44,31 @@ struct LatticeBox {
   std::array<int, 3> count{};
 
   int particle(const std::array<int, 3>& at) const { return first + (at[0] * count[1] + at[1]) * count[2] + at[2]; }
+  /// Of the particle at `arm` (m) from the centre, in the body's frame; -1: it is not on the lattice.
+  int particle_at(const Vector& arm) const {
+    const std::array<double, 3> arms{arm.x, arm.y, arm.z}, halves{half.x, half.y, half.z};
+    std::array<int, 3> at{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double cells = 0.5 * count[k] * (arms[k] / halves[k] + 1.0) - 0.5;
+      at[k] = int(std::lround(cells));
+      if (std::fabs(cells - at[k]) > 0.01 || at[k] < 0 || at[k] >= count[k]) return -1;
+    }
+    return particle(at);
+  }
 };
+
+/// Particles along the edges (m) of a box. Throws std::invalid_argument where an edge is no whole number of the spacing (m).
+inline std::array<int, 3> lattice_counts(const Vector& edges, double spacing) {
+  std::array<int, 3> counts{};
+  const std::array<double, 3> lengths{edges.x, edges.y, edges.z};
+  for (std::size_t k = 0; k < 3; ++k) {
+    counts[k] = int(std::lround(lengths[k] / spacing));
+    if (counts[k] < 1 || std::abs(counts[k] * spacing - lengths[k]) > 1e-3 * spacing)
+      keywords::refuse("an edge of " + keywords::text(lengths[k]) + " m; it must be a whole number of the spacing, " +
+                       keywords::text(spacing) + " m");
+  }
+  return counts;
+}
 
 /// A floor or side: solid where (x - point) . normal < 0.
 struct LatticePlane {

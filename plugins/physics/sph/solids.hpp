@@ -11,27 +11,23 @@
 namespace dembark::sph {
 
 struct Solids {
-  std::vector<int> body;                   ///< of each particle
-  std::vector<Vector> local;               ///< m, from the body's centre in its frame
+  // Of the particles of this process, and then of the images of others'.
   std::vector<Vector> position, velocity;  ///< m, m/s
   std::vector<double> density;             ///< kg/m^3; of dynamic boundary particles only
   std::vector<double> pressure;            ///< Pa
   std::vector<Vector> met;                 ///< m/s, the velocity that viscosity meets
-  std::vector<Quad> sum;                   ///< of loops
+  std::vector<Record> records;             ///< and one far away
+  // Of its own particles.
+  std::vector<int> body;      ///< of each particle
+  std::vector<Vector> local;  ///< m, from the body's centre in its frame
+  std::vector<Quad> sum;      ///< of loops; after the forces: accelerations of fluid particles of this mass, m/s^2
   std::vector<double> rate;
   std::vector<Vector> velocity_sum;
-  std::vector<Record> records;   ///< and one far away
-  std::vector<Rows> of_fluid;    ///< solid particles near each fluid one, by slabs of the fluid
-  std::vector<Rows> near_fluid;  ///< fluid particles near each solid one, by blocks of the solid ones
-  CellOrder order;
+  std::vector<Rows> of_fluid;    ///< solid particles near each fluid one
+  std::vector<Rows> near_fluid;  ///< fluid particles near each solid one
 
   int size() const { return int(body.size()); }
-  bool active(int k) const {
-    const Rows& rows = near_fluid[std::size_t(k) / block];
-    const int row = k - rows.begin;
-    return rows.start[row + 1] > rows.start[row];
-  }
-  static constexpr int block = 256;
+  int with_images() const { return int(position.size()); }
 
   void add(int number, const Vector& arm, double rho) {
     body.push_back(number);
@@ -51,14 +47,13 @@ struct Solids {
   }
   /// Room for sums and records.
   void resize() {
-    const std::size_t n = body.size();
+    const std::size_t n = position.size();
     pressure.resize(n, 0.0);
     met.resize(n);
-    sum.assign(n, Quad{});
-    rate.assign(n, 0.0);
-    velocity_sum.assign(n, Vector{});
     records.resize(n + 1);
-    near_fluid.resize((n + block - 1) / block);
+    sum.assign(body.size(), Quad{});
+    rate.assign(body.size(), 0.0);
+    velocity_sum.assign(body.size(), Vector{});
   }
 };
 

@@ -22,6 +22,7 @@
 
 #include "../keyword_reader.hpp"
 #include "crowding.hpp"
+#include "neighbours.hpp"
 #include "passes.hpp"
 
 namespace dembark::sph {
@@ -46,7 +47,7 @@ class Solver {
     fluid.pressure.resize(n);
     fluid.id.resize(n);
     for (std::size_t i = 0; i < n; ++i) fluid.id[i] = int(i);
-    update_pressure();
+    passes_.pressures(scene_);
   }
 
   /// A wall or body of particles at `points` (m, in its frame); returns its number. Only before the first step.
@@ -81,24 +82,23 @@ class Solver {
   /// One step of dt (s). Throws std::invalid_argument for a step that is not stable and as prepare(), std::runtime_error when the fluid
   /// blows up.
   void step(double dt) {
-    check_step(dt);
+    const std::string wrong = scene_.settings.step_error(dt);
+    if (!wrong.empty()) throw std::invalid_argument(wrong);
     prepare();
     FluidParticles& fluid = scene_.fluid;
-    for (Body& b : scene_.bodies) b.kick(0.5 * dt);
-    scene_.lost.work += 0.5 * dt * power();
-    for (Body& b : scene_.bodies) b.drift(dt);
-    scene_.each([&](int i) {
-      fluid.velocity[i] += (0.5 * dt) * fluid.acceleration[i];
-      fluid.position[i] += dt * fluid.velocity[i] + fluid.shift[i];
-    });
+    double power = 0.0;
+    for (Body& b : scene_.bodies) power += b.first_half(dt);
+    scene_.lost.work += 0.5 * dt * power;
+    scene_.each(fluid.size(),
+                [&](int i) { first_half(fluid.position[i], fluid.velocity[i], (0.5 * dt) * fluid.acceleration[i], fluid.shift[i], dt); });
     check_speed();
     for (Solids& set : scene_.solids) set.follow(scene_.bodies);
-    if (scene_.neighbours.outdated(fluid, scene_.solids, scene_.settings.skin * scene_.settings.h())) search();
-    passes_.density(scene_, dt);
-    passes_.forces(scene_, dt);
-    scene_.each([&](int i) { fluid.velocity[i] += (0.5 * dt) * fluid.acceleration[i]; });
-    scene_.lost.work += 0.5 * dt * power();
-    for (Body& b : scene_.bodies) b.kick(0.5 * dt);
+    if (neighbours_.outdated(scene_, scene_.settings.skin * scene_.settings.h())) search();
+    compute(dt);
+    scene_.each(fluid.size(), [&](int i) { fluid.velocity[i] += (0.5 * dt) * fluid.acceleration[i]; });
+    power = 0.0;
+    for (Body& b : scene_.bodies) power += b.second_half(dt);
+    scene_.lost.work += 0.5 * dt * power;
     time_ += dt;
     ++steps_;
   }
@@ -106,7 +106,7 @@ class Solver {
   double time() const { return time_; }
   long steps() const { return steps_; }
   /// How often neighbours were searched.
-  long searches() const { return scene_.neighbours.builds(); }
+  long searches() const { return neighbours_.builds(); }
   /// Fluid, in the order of the cells (`id` has its numbers), walls and bodies.
   const Scene& scene() const { return scene_; }
   /// To change loads, the velocities and accelerations of bodies that are not free, and the places of those that are driven.
@@ -123,13 +123,8 @@ class Solver {
     Energies e = scene_.lost;
     const Settings& s = scene_.settings;
     const FluidParticles& fluid = scene_.fluid;
-    for (int i = 0; i < fluid.size(); ++i) {
-      e.kinetic += 0.5 * s.mass() * dot(fluid.velocity[i], fluid.velocity[i]);
-      e.potential -= s.mass() * dot(s.gravity, fluid.position[i]);
-      e.compression += s.mass() * s.state.energy(fluid.density[i]);
-    }
-    for (const Body& b : scene_.bodies)
-      if (b.free) e.bodies += b.kinetic_energy() - b.mass * dot(s.gravity, b.position);
+    for (int i = 0; i < fluid.size(); ++i) add_energies(s, fluid.position[i], fluid.velocity[i], fluid.density[i], e);
+    for (const Body& b : scene_.bodies) e.bodies += b.energy(s.gravity);
     return e;
   }
 
@@ -149,7 +144,7 @@ class Solver {
     std::size_t at = 4;
     exchange([&](double& value) { value = numbers[at++]; });
     judged_ = true;
-    update_pressure();
+    passes_.pressures(scene_);
     for (Solids& set : scene_.solids) set.follow(scene_.bodies);
   }
 
@@ -161,78 +156,56 @@ class Solver {
     return settings;
   }
 
-  void check_step(double dt) const {
-    const double most = scene_.settings.longest_step();
-    if (dt > 0.0 && dt <= most * (1.0 + 1e-9)) return;
-    throw std::invalid_argument("the time step must be > 0 and at most 0.6 h/sound_speed = " + std::to_string(1e3 * most) + " ms, not " +
-                                std::to_string(1e3 * dt) + " ms");
-  }
-
   void begin() {
     if (begun_) return;
-    for (Solids& set : scene_.solids) {
-      set.resize();
-      set.follow(scene_.bodies);
-    }
+    for (Solids& set : scene_.solids) set.follow(scene_.bodies);
     search();
-    passes_.forces(scene_, 0.0);
+    compute(0.0);
     begun_ = true;
   }
 
   std::vector<double> packed() {
-    scene_.neighbours.forget();
+    neighbours_.forget();
     std::vector<double> out{version, double(scene_.fluid.size()), double(scene_.bodies.size()), double(scene_.solids[0].size())};
     exchange([&](double& value) { out.push_back(value); });
     return out;
   }
 
   void check_room() {
-    const std::vector<Vector>& x = scene_.fluid.position;
-    const auto fluid = [&](int i) { return x[std::size_t(i)]; };
-    Crowding crowding(scene_.settings, x.size());
-    for (const Rows& rows : scene_.neighbours.pairs()) crowding.add(rows, int(x.size()), true, fluid, fluid);
-    for (const Solids& set : scene_.solids)
-      for (const Rows& rows : set.of_fluid)
-        crowding.add(rows, set.size(), false, fluid, [&](int k) { return set.position[std::size_t(k)]; });
-    const int worst = crowding.worst();
+    const Crowding found = crowding(scene_);
+    const int worst = found.worst();
     judged_ = worst < 0;
     if (judged_) return;
     begun_ = false;
-    const Vector& p = x[std::size_t(worst)];
+    const Vector& p = scene_.fluid.position[std::size_t(worst)];
     throw std::invalid_argument("the particle of fluid at (" + keywords::text(p.x) + ", " + keywords::text(p.y) + ", " +
-                                keywords::text(p.z) + ") m " + crowding.line(worst));
+                                keywords::text(p.z) + ") m " + found.line(worst));
   }
 
   void search() {
     const Settings& s = scene_.settings;
-    scene_.neighbours.build(scene_.fluid, scene_.solids, (support + s.skin) * s.h(), s.threads);
-    passes_.resize(scene_);
+    neighbours_.build(scene_, (support + s.skin) * s.h());
   }
 
-  void update_pressure() {
+  void compute(double dt) {
+    passes_.compute(scene_, dt, OneProcess{});
     FluidParticles& fluid = scene_.fluid;
-    scene_.each([&](int i) { fluid.pressure[i] = scene_.settings.state.pressure(fluid.density[i]); });
-  }
-
-  /// Power (W) that moved bodies, loads and films put in.
-  double power() const {
-    double sum = 0.0;
-    for (const Body& b : scene_.bodies) {
-      const Vector force = b.film + (b.free ? b.load : -b.force), torque = b.film_torque + (b.free ? b.load_torque : -b.torque);
-      sum += dot(force, b.velocity) + dot(torque, b.spin);
+    const Vector& gravity = scene_.settings.gravity;
+    scene_.each(fluid.size(), [&](int i) { fluid.acceleration[i] = gravity + Vector{fluid.sum[i].x, fluid.sum[i].y, fluid.sum[i].z}; });
+    for (Body& b : scene_.bodies) {
+      b.force += b.film;
+      b.torque += b.film_torque;
+      b.accelerate(gravity);
     }
-    return sum;
   }
 
   /// Speeds beyond that of sound, or that are no numbers.
   void check_speed() const {
-    const double sound = scene_.settings.state.sound_speed;
     for (int i = 0; i < scene_.fluid.size(); ++i) {
       const Vector& v = scene_.fluid.velocity[i];
-      if (dot(v, v) <= sound * sound) continue;
+      if (slower_than_sound(scene_.settings, v)) continue;
       throw std::runtime_error("the fluid blew up at t = " + std::to_string(time_) + " s: particle " + std::to_string(scene_.fluid.id[i]) +
-                               " moves at " + std::to_string(norm(v)) + " m/s, faster than sound (" + std::to_string(sound) +
-                               " m/s); take a larger sound_speed, a shorter step or thicker walls");
+                               " " + too_fast(scene_.settings, v));
     }
   }
 
@@ -263,6 +236,7 @@ class Solver {
   }
 
   Scene scene_;
+  Neighbours neighbours_;
   Passes passes_;
   double time_ = 0.0;
   long steps_ = 0;

@@ -90,8 +90,9 @@ TEST_CASE("SPH cells: rows hold all pairs within the reach, once", "[sph]") {
   for (const bool plane : {true, false}) {
     std::mt19937 random(5);
     std::uniform_real_distribution<double> u(0.0, 1.0);
-    FluidParticles fluid;
-    std::vector<Solids> solids(1);
+    Scene scene;
+    FluidParticles& fluid = scene.fluid;
+    std::vector<Solids>& solids = scene.solids;
     const int n = 600;
     for (int i = 0; i < n; ++i) {
       fluid.position.push_back({3.0 * u(random), u(random), plane ? 0.0 : 0.7 * u(random)});
@@ -103,13 +104,12 @@ TEST_CASE("SPH cells: rows hold all pairs within the reach, once", "[sph]") {
       solids[0].add(0, {}, 1.0);
       solids[0].position.back() = {4.0 * u(random) - 0.5, 2.0 * u(random) - 0.5, plane ? 0.0 : u(random)};
     }
-    solids[0].resize();
     Neighbours neighbours;
     const double reach = 0.21;
-    neighbours.build(fluid, solids, reach, 1);
+    neighbours.build(scene, reach);
     const auto near = [&](const Vector& a, const Vector& b) { return dot(a - b, a - b) < reach * reach; };
     std::set<std::pair<int, int>> found, due;
-    for (const Rows& rows : neighbours.pairs())
+    for (const Rows& rows : fluid.pairs)
       for (int i = rows.begin; i < rows.end; ++i)
         for (int k = rows.start[i - rows.begin]; k < rows.start[i - rows.begin + 1]; ++k)
           if (rows.neighbour[k] < n) {
