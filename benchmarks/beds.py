@@ -20,17 +20,21 @@ from dembark.validation.engines import Engine, call
 
 # A line of LIGGGHTS's and of LAMMPS's timings: elapsed time, and with `timer full` its share of processor time in per cent.
 _LOOPS = (r"^Loop time of (\S+)() on ", r"^Loop time of (\S+) on .*\n\n(?:Performance.*\n)?(\S+)% CPU use")
-_PAIRS = (r"^Pair  time \(%\) = (\S+)() ", r"^Pair +\| \S+ +\| (\S+) +\| \S+ +\| +\S+ \| +(\S+) \|")
+_SECTIONS = (r"^{} +time \(%\) = (\S+)() ", r"^{} +\| \S+ +\| (\S+) +\| \S+ +\| +\S+ \| +(\S+) \|")
+# Grains of a rank, and copies of its neighbours' grains: the mean over the ranks, and the most.
+_COUNTS = {"own": r"^Nlocal: +(\S+) ave", "most": r"^Nlocal: .* (\S+) max", "halo": r"^Nghost: +(\S+) ave"}
 
 
 @dataclass(frozen=True)
 class Bed:
-    """Settled spheres in a data file: most have the `diameter` (m), the others are `ratio` times as large; the base is `width` (m) wide."""
+    """Settled spheres in a data file: most have the `diameter` (m), the others are `ratio` times as large; the base is `width` (m) wide.
+    Or spheres that flow in a drum about z of the radius `drum` (m)."""
 
     path: Path
     diameter: float = 0.005
     ratio: float = 1.0
     width: float = 0.1
+    drum: float = 0.0
 
     @property
     def step(self) -> float:
@@ -38,20 +42,29 @@ class Bed:
         return 0.004 * self.diameter
 
     @property
+    def skin(self) -> float:
+        """m, by which grains may move before lists of neighbours are built anew."""
+        return 0.2 * self.diameter
+
+    @property
     def variables(self) -> dict[str, object]:
         """Of replay.in and replay_lammps.in."""
-        return {"bed": self.path, "skin": 0.2 * self.diameter, "step": self.step}
+        return {"bed": self.path, "skin": self.skin, "step": self.step}
 
 
 def read_log(text: str, wall_clock: bool = True) -> Sample:
-    """`loop` and `pair`, seconds of the last run in a log of LIGGGHTS, or of LAMMPS (elapsed, or processor time); RunError without one."""
+    """Of the last run in a log of LIGGGHTS, or of LAMMPS (elapsed, or processor time): `loop`, `pair` and `comm` in s, and where they are
+    there the numbers of grains `own`, `most` and `halo`; RunError without a run."""
     lammps = "MPI task timing breakdown" in text
-    loops, pairs = (re.findall(patterns[lammps], text, re.MULTILINE) for patterns in (_LOOPS, _PAIRS))
-    if not loops or len(loops) != len(pairs):
+    patterns = {"loop": _LOOPS[lammps], "pair": _SECTIONS[lammps].format("Pair"), "comm": _SECTIONS[lammps].format("Comm")}
+    times = {name: re.findall(pattern, text, re.MULTILINE) for name, pattern in patterns.items()}
+    if not times["loop"] or len({len(found) for found in times.values()}) > 1:
         errors = re.findall(r"^ERROR.*$", text, re.MULTILINE)
         raise RunError("the engine did not finish a timed run", errors[-1] if errors else "its log holds no timings")
-    loop, pair = (float(time) * (0.01 * float(part) if part and not wall_clock else 1.0) for time, part in (loops[-1], pairs[-1]))
-    return {"loop": loop, "pair": pair}
+    last = {name: found[-1] for name, found in times.items()}
+    counts = {name: re.findall(pattern, text, re.MULTILINE)[-1:] for name, pattern in _COUNTS.items()}
+    return {name: float(time) * (0.01 * float(part) if part and not wall_clock else 1.0) for name, (time, part) in last.items()} | {
+        name: float(found[0]) for name, found in counts.items() if found}
 
 
 def stock_liggghts() -> Path:
@@ -62,13 +75,21 @@ def stock_liggghts() -> Path:
     return Path(found)
 
 
-def with_clock() -> list[str]:
-    """Words before LIGGGHTS that make MPI's timer a processor-time clock; what does so is compiled once."""
-    library, source = CACHE / "cpu_clock.so", HERE / "cpu_clock.c"
+def with_clock(wall_clock: bool = False) -> list[str]:
+    """Words before an engine with MPI that make its ranks account for themselves, and MPI's timer a processor-time clock unless
+    `wall_clock`; what does so is compiled once."""
+    library, source = CACHE / "rank.so", HERE / "rank.c"
     CACHE.mkdir(parents=True, exist_ok=True)
     if not library.exists() or library.stat().st_mtime < source.stat().st_mtime:
         subprocess.run(["cc", "-O2", "-shared", "-fPIC", str(source), "-o", str(library)], check=True)
-    return ["env", f"LD_PRELOAD={library}"]
+    return ["env", f"LD_PRELOAD={library}", *(["WALL_CLOCK=1"] if wall_clock else [])]
+
+
+def account(folder: Path) -> Sample:
+    """What the ranks under `with_clock` left in `folder`: the highest peak of `resident` memory (B), `messages` and `bytes` of a rank."""
+    ranks = [[float(word) for word in path.read_text(encoding="utf-8").split()] for path in folder.glob("rank-*")]
+    peaks, messages, sizes = zip(*ranks, strict=True) if ranks else ([0.0], [0.0], [0.0])
+    return {"resident": 1024.0 * max(peaks), "messages": sum(messages) / len(messages), "bytes": sum(sizes) / len(sizes)}
 
 
 def pinned(cores: int = 1) -> list[str]:
@@ -79,20 +100,21 @@ def pinned(cores: int = 1) -> list[str]:
 
 def run_deck(program: Sequence[str | Path], deck: str, variables: Mapping[str, object], environment: Mapping[str, str],
              wall_clock: bool = True) -> Sample:
-    """One run of a deck of this folder, in a scratch folder, by the words `program`; see `read_log`."""
+    """One run of a deck of this folder, in a scratch folder, by the words `program`; see `read_log` and `account`."""
     words = [word for key, value in variables.items() for word in ("-var", key, str(value))]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
-        done = call([*program, "-in", HERE / deck, "-log", "log", *words], Path(name), environment, timeout=3600)
-        log = Path(name, "log")
+        done = call([*program, "-in", HERE / deck, "-log", "log", *words], Path(name), {**environment, "RANKS": name},
+                    timeout=7200)
+        log, ranks = Path(name, "log"), account(Path(name))
         text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else done.stdout + done.stderr
     if done.returncode:
         raise RunError(f"{deck} ended with exit code {done.returncode}", *re.findall(r"^ERROR.*$", text + done.stdout, re.MULTILINE)[-1:])
-    return read_log(text, wall_clock)
+    return {**read_log(text, wall_clock), **ranks}
 
 
 def run_yade(engine: Engine, bed: Bed, law: str, relax: int, steps: int, loop: str = "InteractionLoop", threads: int = 1) -> Sample:
     """One run of yade_bed.py with contact law `law` (`stock`, `dembark`, or a pre-sliding curve of it) in an engine `loop`."""
-    options = {"bed": bed.path, "width": bed.width, "step": bed.step, "law": law, "loop": loop, "relax": relax, "steps": steps,
+    options = {"bed": bed.path, "step": bed.step, "law": law, "loop": loop, "relax": relax, "steps": steps,
                "samples": 1}
     words: list[str | Path] = [*pinned(threads), engine.executable, f"-j{threads}", "-n", "-x", HERE / "yade_bed.py"]
     with tempfile.TemporaryDirectory(prefix="dembark-bench-") as name:
@@ -107,10 +129,11 @@ def run_yade(engine: Engine, bed: Bed, law: str, relax: int, steps: int, loop: s
     return dict(found)
 
 
-def bed_of(count: int, ratio: float) -> tuple[Bed, dict[str, object]]:
-    """The bed of `count` spheres, without its path, and the variables of settle.in. Of two sizes each has half of the volume."""
+def bed_of(count: int, ratio: float, base: float = 0.1) -> tuple[Bed, dict[str, object]]:
+    """The bed of `count` spheres, without its path, and the variables of settle.in. Of one size its base is `base` (m) wide, of two sizes
+    each has half of the volume."""
     if ratio == 1.0:
-        return Bed(Path()), {"count": count}
+        return Bed(Path(), width=base), {"count": count} | ({"width": base} if base != 0.1 else {})
     large = max(1, round(count / (1.0 + ratio**3)))
     diameter = 0.02 / ratio
     # As wide as it is high, but not narrower than three large ones; spheres fill 0.62 of it.
@@ -122,10 +145,10 @@ def bed_of(count: int, ratio: float) -> tuple[Bed, dict[str, object]]:
                  "step": bed.step, "steps": round((high / 0.3 + 0.2) / bed.step)}
 
 
-def settled_bed(count: int, ratio: float = 1.0) -> Bed:
-    """Data file of `count` settled spheres, made by stock LIGGGHTS once and kept."""
+def settled_bed(count: int, ratio: float = 1.0, base: float = 0.1) -> Bed:
+    """Data file of `count` settled spheres, made by stock LIGGGHTS once and kept; see `bed_of`."""
     deck = HERE / "settle.in"
-    bed, variables = bed_of(count, ratio)
+    bed, variables = bed_of(count, ratio, base)
     key = hashlib.sha256(deck.read_bytes() + repr(variables).encode()).hexdigest()[:12]
     bed = replace(bed, path=CACHE / f"bed-{key}.data")
     if bed.path.exists():

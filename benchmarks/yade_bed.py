@@ -1,6 +1,6 @@
 """The settled bed in YADE under one contact law, timed.
 
-    yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING [loop=SphereContactLoop] [width=M] [step=S] ...
+    yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING [loop=SphereContactLoop] [step=S] ...
 
 Prints one line of JSON a sample: processor time of the loop and of the interaction loop (its share of the loop by the engine's
 own timers), in seconds.
@@ -12,12 +12,14 @@ import time
 
 options = dict(word.partition("=")[::2] for word in sys.argv[1:])
 friction, kinetic, restitution = 0.5, 0.4, 0.5
-width = float(options.get("width", 0.1))  # of the square base (m)
 relax, steps, samples = (int(options[key]) for key in ("relax", "steps", "samples"))
 
 with open(options["bed"], encoding="utf-8") as bed:
     rows = iter(bed)
+    widths = []  # of the base (m)
     for line in rows:
+        if line.rstrip().endswith("hi"):
+            widths.append(float(line.split()[1]))
         if line.startswith("Atoms"):
             break
     grains = [[float(word) for word in line.split()] for line in rows if line.strip()]
@@ -25,7 +27,7 @@ diameter = min(grain[2] for grain in grains)
 
 O.dt = float(options.get("step", 2e-5))
 O.periodic = True
-O.cell.setBox(width, width, 1.0)
+O.cell.setBox(*widths[:2], 1.0)
 material = O.materials.append(FrictMat(young=5e6, poisson=0.3, density=2500, frictionAngle=math.atan(friction)))
 O.bodies.append([utils.sphere(grain[4:7], 0.5 * grain[2], material=material, mask=3) for grain in grains])
 floor = O.bodies.append(utils.box((0, 0, -diameter), (1e3 * diameter, 1e3 * diameter, diameter), fixed=True, material=material, mask=1))

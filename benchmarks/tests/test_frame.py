@@ -10,8 +10,14 @@ from dembark.common.errors import RunError
 
 LOG = """Loop time of 3.5 on 1 procs for 1000 steps with 20 atoms, finish time X
 Pair  time (%) = 2.5 (80)
+Comm  time (%) = 0.5 (14)
 Loop time of 1.25 on 1 procs for 400 steps with 20 atoms, finish time X
 Pair  time (%) = 0.75 (60)
+Comm  time (%) = 0.25 (20)
+
+Nlocal:    10 ave 12 max 8 min
+Histogram: 1 0 0 0 0 0 0 0 0 1
+Nghost:    5.5 ave 6 max 5 min
 """
 LAMMPS = """Loop time of 2 on 1 procs for 400 steps with 20 atoms
 
@@ -22,13 +28,17 @@ Section |  min time  |  avg time  |  max time  |%varavg|  %CPU | %total
 -----------------------------------------------------------------------
 Pair    | 1.5        | 1.6        | 1.7        |   0.0 |  25.0 | 80.00
 Neigh   | 0          | 0          | 0          |   0.0 | 100.0 |  0.00
+Comm    | 0.1        | 0.2        | 0.3        |   0.0 |  50.0 | 10.00
+
+Nlocal:             10 ave          12 max           8 min
 """
 
 
 def test_last_run_of_a_log():
-    assert read_log(LOG) == {"loop": 1.25, "pair": 0.75}
-    assert read_log(LAMMPS.replace("of 2", "of 9") + LAMMPS, wall_clock=False) == {"loop": 1.0, "pair": 0.4}
-    assert read_log(LAMMPS) == {"loop": 2.0, "pair": 1.6}
+    counts = {"own": 10.0, "most": 12.0}
+    assert read_log(LOG) == {"loop": 1.25, "pair": 0.75, "comm": 0.25, "own": 10.0, "most": 12.0, "halo": 5.5}
+    assert read_log(LAMMPS.replace("of 2", "of 9") + LAMMPS, wall_clock=False) == {"loop": 1.0, "pair": 0.4, "comm": 0.1} | counts
+    assert read_log(LAMMPS) == {"loop": 2.0, "pair": 1.6, "comm": 0.2} | counts
 
 
 @pytest.mark.parametrize(("text", "what"),

@@ -1,0 +1,116 @@
+"""What a run costs on other numbers of grains and ranks than were measured: time, memory and messages, fitted to samples of mpi_scaling.
+
+On a rank with n grains a step takes n * imbalance * t_grain + halo * t_halo + t_step, where `halo` counts the copies of grains that other
+ranks own or that are periodic images; between nodes the latency of its messages and their bytes over the bandwidth come on top.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from dembark.postproc.statistics import Estimate, student
+
+Array = NDArray[np.float64]
+# Of a sample: processor or wall time of `loop` and of `comm` in it (s) for `steps`; grains of a rank (`own`, at `most`, `halo`) and of all;
+# peak memory (B) of a rank, `resident`, and of one without grains, `program`; `messages` and `bytes` a step.
+COLUMNS = ["grains", "cores", "steps", "loop", "comm", "own", "most", "halo", "resident", "program", "messages", "bytes"]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Relative least squares: `values` (k,), their covariance `spread` (k, k), and the `degrees` of freedom."""
+
+    values: Array
+    spread: Array
+    degrees: int
+
+    @classmethod
+    def of(cls, measured: pd.Series, *columns: pd.Series | float) -> Self:
+        """`measured` (n,) as a sum of `columns` (k of n) times numbers; each sample counts by its relative error."""
+        scaled = np.column_stack([np.broadcast_to(column, measured.shape) / measured for column in columns])
+        values, *_ = np.linalg.lstsq(scaled, np.ones(len(measured)), rcond=None)
+        degrees = len(measured) - len(columns)
+        variance = float(np.sum((1.0 - scaled @ values) ** 2)) / degrees if degrees > 0 else math.inf
+        return cls(values, variance * np.linalg.pinv(scaled.T @ scaled), degrees)
+
+    def at(self, *columns: float) -> Estimate:
+        """The sum for `columns` (k,), with its 95 % interval."""
+        row = np.array(columns)
+        return Estimate(float(row @ self.values), student(self.degrees) * math.sqrt(max(0.0, float(row @ self.spread @ row))))
+
+
+@dataclass(frozen=True)
+class Network:
+    """Between nodes: `latency` (s) of a message, and `bandwidth` (B/s) of a rank."""
+
+    latency: float
+    bandwidth: float
+
+
+@dataclass(frozen=True)
+class Model:
+    """Of one engine and scene: what its samples were fitted by.
+
+    own : s a step and grain
+    halo : s a step and copy; s a step
+    memory : B a grain or copy; B of a rank on top of `program`, what it has without grains
+    messages, message : messages of a step in each of the `directions` that are cut; B a copy
+    density : grains in a piece that is as wide, in these directions, as the range in which grains are copied
+    """
+
+    own: Fit
+    halo: Fit
+    memory: Fit
+    program: float
+    messages: float
+    message: float
+    density: float
+    directions: int
+
+    @classmethod
+    def of(cls, samples: pd.DataFrame, density: float, directions: int) -> Self:
+        """From `samples` with COLUMNS, at least three of them timed; those with 0 steps are only counted."""
+        timed, split = samples[samples["steps"] > 0], samples[samples["cores"] > 1]
+        steps = timed["steps"]
+        held = samples["resident"] - samples["program"] - 4.0 * samples["grains"]
+        cut = split[split["cores"] == split["cores"].min()]
+        return cls(Fit.of((timed["loop"] - timed["comm"]) / steps, timed["most"]), Fit.of(timed["comm"] / steps, timed["halo"], 1.0),
+                   Fit.of(held, samples["own"] + samples["halo"], 1.0), samples["program"].median(), cut["messages"].median(),
+                   (split["bytes"] / split["halo"]).max(), density, directions)
+
+    def copies(self, grains: float) -> float:
+        """Halo of a rank with `grains` and neighbours, or periodic images, on both sides in each direction."""
+        width = (grains / self.density) ** (1.0 / self.directions)
+        return grains * ((1.0 + 2.0 / width) ** self.directions - 1.0)
+
+    def step(self, grains: float, halo: float, imbalance: float = 1.0) -> Estimate:
+        """s of a step on ranks of one node with `grains` and `halo` each, the fullest with `imbalance` times as many."""
+        parts = self.own.at(grains * imbalance), self.halo.at(halo, 1.0)
+        return Estimate(sum(part.value for part in parts), math.hypot(*(part.half for part in parts)))
+
+    def between_nodes(self, halo: float, ranks: int, network: Network) -> float:
+        """s of a step on top. All ranks decide together whether to build lists anew, in 2 log2(ranks) messages one after the other."""
+        messages = self.messages * self.directions + 2.0 * math.log2(ranks)
+        return messages * network.latency + halo * self.message / network.bandwidth
+
+    def resident(self, grains: float, halo: float, everywhere: float) -> Estimate:
+        """Peak memory (B) of a rank. The map of ids takes 4 B for each grain there is `everywhere`."""
+        held = self.memory.at(grains + halo, 1.0)
+        return Estimate(self.program + 4.0 * everywhere + held.value, held.half)
+
+    def deviations(self, samples: pd.DataFrame) -> dict[str, float]:
+        """Largest relative deviation of the model from each of `samples`: of the `time` of a step, of `memory` and of the `halo`."""
+        found: dict[str, list[float]] = {"time": [], "memory": [], "halo": []}
+        for row in samples[COLUMNS].itertuples():
+            if row.steps:
+                step = self.step(row.own, row.halo, row.most / row.own).value
+                found["time"].append(step * row.steps / row.loop - 1.0)
+            found["memory"].append(self.resident(row.own, row.halo, row.grains).value / row.resident - 1.0)
+            found["halo"].append(self.copies(row.own) / row.halo - 1.0)
+        return {name: max(values, key=abs, default=math.nan) for name, values in found.items()}
