@@ -192,30 +192,30 @@ def cells(points: Iterable[Point], samples: pd.DataFrame) -> list[list[str]]:
     return table
 
 
-def model_of(samples: pd.DataFrame, scene: str) -> Model:
-    """The model of one engine and `scene`."""
+def model_of(scene: str, samples: pd.DataFrame, alone: pd.DataFrame) -> Model:
+    """The model of `samples` of a scene in one engine, with those of one rank `alone`."""
     bed = bed_of(scene, SLICE)
     size = np.ptp(read_grains(bed.path)[0], axis=1)
     over = size[2:] if scene == "drum" else size[:2]
-    return Model.of(samples, SLICE * float(np.prod((bed.diameter + bed.skin) / over)), len(over))
+    return Model.of(samples, alone, SLICE * float(np.prod((bed.diameter + bed.skin) / over)), len(over))
 
 
 def fitted(known: pd.DataFrame) -> tuple[dict[tuple[str, str], Model], list[list[str]]]:
     """Models by scene and engine, of which two sizes and several ranks were measured, and their rows of the table."""
     models, table = {}, []
     for (scene, engine), samples in known[known["engine"].isin(_DECKS)].groupby(["scene", "engine"], sort=False):
-        timed, largest = samples[samples["steps"] > 0], samples["grains"] == samples["grains"].max()
-        if timed["grains"].nunique() < 2 or samples["cores"].max() < 2:
+        alone = known[(known["engine"] == engine) & (known["cores"] == 1)]
+        sizes = sorted(samples["grains"].unique())
+        if len(sizes) < 2 or samples["cores"].nunique() < 2 or alone.empty:
             continue
-        model = models[scene, engine] = model_of(samples, scene)
-        off = model.deviations(samples)
-        blind = model_of(samples[~largest], scene).deviations(samples[largest]) if timed["grains"].nunique() > 2 else {}
+        model = models[scene, engine] = model_of(scene, samples, alone)
+        off, smaller = model.deviations(samples), samples["grains"] < sizes[-1]
+        blind = model_of(scene, samples[smaller], alone[alone["grains"] < sizes[-1]]).deviations(samples[~smaller])
         numbers = [(model.own.at(1.0), 1e9), (model.halo.at(1.0, 0.0), 1e9), (model.halo.at(0.0, 1.0), 1e6),
                    (model.memory.at(1.0, 0.0), 1.0)]
         table.append([scene, engine, *(f"{number.value * scale:.3g} +- {number.half * scale:.2g}" for number, scale in numbers),
-                      size_text(model.program), f"{model.messages:.2f}", f"{model.message:.3g}",
-                      *(f"{100.0 * off[name]:+.1f} %" for name in ("time", "memory", "halo")),
-                      *(f"{100.0 * blind[name]:+.1f} %" if blind else "" for name in ("time", "memory"))])
+                      size_text(model.program + model.memory.at(0.0, 1.0).value), f"{model.messages:.2f}", f"{model.message:.3g}",
+                      *(f"{100.0 * found[name]:+.1f} %" for found, names in ((off, off), (blind, ("time", "memory"))) for name in names)])
     return models, table
 
 

@@ -36,13 +36,14 @@ class Fit:
         scaled = np.column_stack([np.broadcast_to(column, measured.shape) / measured for column in columns])
         values, *_ = np.linalg.lstsq(scaled, np.ones(len(measured)), rcond=None)
         degrees = len(measured) - len(columns)
-        variance = float(np.sum((1.0 - scaled @ values) ** 2)) / degrees if degrees > 0 else math.inf
+        variance = float(np.sum((1.0 - scaled @ values) ** 2)) / max(degrees, 1)
         return cls(values, variance * np.linalg.pinv(scaled.T @ scaled), degrees)
 
     def at(self, *columns: float) -> Estimate:
         """The sum for `columns` (k,), with its 95 % interval."""
         row = np.array(columns)
-        return Estimate(float(row @ self.values), student(self.degrees) * math.sqrt(max(0.0, float(row @ self.spread @ row))))
+        deviation = math.sqrt(max(0.0, float(row @ self.spread @ row)))
+        return Estimate(float(row @ self.values), student(self.degrees) * deviation if self.degrees > 0 else math.inf)
 
 
 @dataclass(frozen=True)
@@ -74,14 +75,14 @@ class Model:
     directions: int
 
     @classmethod
-    def of(cls, samples: pd.DataFrame, density: float, directions: int) -> Self:
-        """From `samples` with COLUMNS, at least three of them timed; those with 0 steps are only counted."""
+    def of(cls, samples: pd.DataFrame, alone: pd.DataFrame, density: float, directions: int) -> Self:
+        """From `samples` with COLUMNS, of one and of more ranks; those with 0 steps are only counted. Copies are timed in `alone`, samples
+        of one rank in all scenes, where none waits for another."""
         timed, split = samples[samples["steps"] > 0], samples[samples["cores"] > 1]
-        steps = timed["steps"]
         held = samples["resident"] - samples["program"] - 4.0 * samples["grains"]
-        cut = split[split["cores"] == split["cores"].min()]
-        return cls(Fit.of((timed["loop"] - timed["comm"]) / steps, timed["most"]), Fit.of(timed["comm"] / steps, timed["halo"], 1.0),
-                   Fit.of(held, samples["own"] + samples["halo"], 1.0), samples["program"].median(), cut["messages"].median(),
+        return cls(Fit.of((timed["loop"] - timed["comm"]) / timed["steps"], timed["most"]),
+                   Fit.of(alone["comm"] / alone["steps"], alone["halo"], 1.0), Fit.of(held, samples["own"] + samples["halo"], 1.0),
+                   samples["program"].median(), split.loc[split["cores"] == split["cores"].min(), "messages"].median(),
                    (split["bytes"] / split["halo"]).max(), density, directions)
 
     def copies(self, grains: float) -> float:
