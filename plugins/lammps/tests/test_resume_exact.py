@@ -131,6 +131,16 @@ def test_what_does_not_fit_is_refused(tmp_path):
     assert "exactly" not in run(tmp_path, text, ranks=2)
 
 
+def test_states_of_ranks_that_fix_balance_divided_are_refused(tmp_path):
+    """The cuts are not in a restart file, and those of a new run are others: a run says so before it writes states."""
+    states = "fix cuts all balance 100 1.0 shift z 10 1.0\n" + EVERY_200
+    # Grains are in the lower half of the box.
+    text = deck("run 450", ranks=2, states=states).replace("processors 2 1 1", "processors 1 1 2")
+    assert "approximately: fix cuts (balance)" in run(tmp_path, text, 2)
+    refused(tmp_path, deck("run 500 upto", ranks=2, resume=True, states=states),
+            "the atoms or their candidates for contacts are others", ranks=2)
+
+
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_run_that_begins_anew_deletes_no_state(tmp_path, ranks):
     text = deck("run 450", ranks=ranks, states=STATES.format(every=200))
