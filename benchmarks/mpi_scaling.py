@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import argparse
 import io
+import json
 import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -219,11 +221,11 @@ def fitted(known: pd.DataFrame) -> tuple[dict[tuple[str, str], Model], list[list
     return models, table
 
 
-def predicted(models: Mapping[tuple[str, str], Model], grains: Iterable[int], ranks: Iterable[int], network: Network) -> list[list[str]]:
+def predicted(models: Mapping[tuple[str, str], Model], grains: Sequence[float], ranks: Sequence[int], network: Network) -> list[list[str]]:
     """Rows of the table of what `grains` on `ranks`, all between nodes, need; balanced."""
     table = []
     for (scene, engine), model in models.items():
-        for count, number in ((count, number) for count in grains for number in ranks):
+        for count, number in product(grains, ranks):
             own = count / number
             halo = model.copies(own)
             inside, between = model.step(own, halo), model.between_nodes(halo, number, network)
@@ -249,6 +251,7 @@ def parsed(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--least", type=int, default=10, help="steps of a sample, at least")
     parser.add_argument("--grid", help="how ranks divide the box, such as '1 2 1'; default: across the periods")
     parser.add_argument("--balance", help="LAMMPS: words of fix balance after its group, such as '100 1.05 shift xy 10 1.02'")
+    parser.add_argument("--samples", type=Path, nargs="+", help="measure nothing, take those of these .json of earlier runs")
     parser.add_argument("--wall-clock", action="store_true", help="elapsed time, for a machine that does nothing else")
     parser.add_argument("--predict", type=float, nargs="+", default=[1e6, 1e7], help="grains to predict")
     parser.add_argument("--there", type=int, nargs="+", default=[16, 64, 256], help="ranks to predict")
@@ -277,21 +280,25 @@ def planned(given: argparse.Namespace) -> list[Point]:
 
 def measure(given: argparse.Namespace) -> None:
     """Run, print and write the tables."""
-    points = planned(given)
-    facts = frame.facts(**{name: find(name).version for name in {point.engine for point in points}},
-                        clock="elapsed time" if given.wall_clock else "processor time")
     options: dict[str, object] = {"grid": given.grid} if given.grid else {}
     options |= {"balanced": 1, "balance": given.balance} if given.balance else {}
-    samples = frame.in_turn("scaling", {point.name: partial(point.sample, given.relax, options, given.wall_clock) for point in points},
-                            given.rounds)
-    known = samples.merge(pd.DataFrame([{**asdict(point), "subject": point.name} for point in points]), on="subject")
-    parts = [f"Medians of {given.rounds} samples.", frame.markdown(HEADS, cells(points, samples))]
+    if given.samples:
+        known = pd.concat([pd.DataFrame(json.loads(path.read_text(encoding="utf-8"))["rows"]) for path in given.samples])
+        points = [Point(*row) for row in known[["scene", "engine", "grains", "cores", "steps"]].drop_duplicates().itertuples(index=False)]
+    else:
+        points = planned(given)
+        samples = frame.in_turn("scaling", {point.name: partial(point.sample, given.relax, options, given.wall_clock) for point in points},
+                                given.rounds)
+        known = samples.merge(pd.DataFrame([{**asdict(point), "subject": point.name} for point in points]), on="subject")
+    facts = frame.facts(**{name: find(name).version for name in {point.engine for point in points}},
+                        clock="elapsed time" if given.wall_clock else "processor time")
+    parts = ["Medians of the samples.", frame.markdown(HEADS, cells(points, known))]
     models, table = fitted(known) if not options else ({}, [])
     if models:
         network = Network(given.latency, given.bandwidth)
         parts += ["Model:", frame.markdown(FITTED, table),
                   f"Prediction for {network.latency:.3g} s a message and {network.bandwidth:.3g} B/s a rank between nodes:",
-                  frame.markdown(PREDICTED, predicted(models, map(round, given.predict), given.there, network))]
+                  frame.markdown(PREDICTED, predicted(models, given.predict, given.there, network))]
     frame.write(given.out, "mpi_scaling", "Scaling with grains and ranks", parts, known.to_dict("records"), facts)
 
 

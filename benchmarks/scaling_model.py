@@ -24,10 +24,11 @@ COLUMNS = ["grains", "cores", "steps", "loop", "comm", "own", "most", "halo", "r
 
 @dataclass(frozen=True)
 class Fit:
-    """Relative least squares: `values` (k,), their covariance `spread` (k, k), and the `degrees` of freedom."""
+    """Relative least squares: `values` (k,), their covariance `spread` (k, k), the relative `variance` of samples, `degrees` of freedom."""
 
     values: Array
     spread: Array
+    variance: float
     degrees: int
 
     @classmethod
@@ -37,13 +38,14 @@ class Fit:
         values, *_ = np.linalg.lstsq(scaled, np.ones(len(measured)), rcond=None)
         degrees = len(measured) - len(columns)
         variance = float(np.sum((1.0 - scaled @ values) ** 2)) / max(degrees, 1)
-        return cls(values, variance * np.linalg.pinv(scaled.T @ scaled), degrees)
+        return cls(values, variance * np.linalg.pinv(scaled.T @ scaled), variance, degrees)
 
-    def at(self, *columns: float) -> Estimate:
-        """The sum for `columns` (k,), with its 95 % interval."""
+    def at(self, *columns: float, sample: bool = False) -> Estimate:
+        """The sum for `columns` (k,), with the 95 % interval of its mean, or of another `sample` there."""
         row = np.array(columns)
-        deviation = math.sqrt(max(0.0, float(row @ self.spread @ row)))
-        return Estimate(float(row @ self.values), student(self.degrees) * deviation if self.degrees > 0 else math.inf)
+        value = float(row @ self.values)
+        variance = max(0.0, float(row @ self.spread @ row)) + (self.variance * value**2 if sample else 0.0)
+        return Estimate(value, student(self.degrees) * math.sqrt(variance) if self.degrees > 0 else math.inf)
 
 
 @dataclass(frozen=True)
@@ -91,8 +93,9 @@ class Model:
         return grains * ((1.0 + 2.0 / width) ** self.directions - 1.0)
 
     def step(self, grains: float, halo: float, imbalance: float = 1.0) -> Estimate:
-        """s of a step on ranks of one node with `grains` and `halo` each, the fullest with `imbalance` times as many."""
-        parts = self.own.at(grains * imbalance), self.halo.at(halo, 1.0)
+        """s of a step on ranks of one node with `grains` and `halo` each, the fullest with `imbalance` times as many; the interval
+        is that of another run."""
+        parts = self.own.at(grains * imbalance, sample=True), self.halo.at(halo, 1.0, sample=True)
         return Estimate(sum(part.value for part in parts), math.hypot(*(part.half for part in parts)))
 
     def between_nodes(self, halo: float, ranks: int, network: Network) -> float:
@@ -102,7 +105,7 @@ class Model:
 
     def resident(self, grains: float, halo: float, everywhere: float) -> Estimate:
         """Peak memory (B) of a rank. The map of ids takes 4 B for each grain there is `everywhere`."""
-        held = self.memory.at(grains + halo, 1.0)
+        held = self.memory.at(grains + halo, 1.0, sample=True)
         return Estimate(self.program + 4.0 * everywhere + held.value, held.half)
 
     def deviations(self, samples: pd.DataFrame) -> dict[str, float]:

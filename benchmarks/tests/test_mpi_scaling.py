@@ -1,5 +1,6 @@
 """Beds and drums that are repeated, the scaling tables, and what ranks of real engines account for."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,19 @@ def test_a_tiled_bed_holds_every_grain_at_each_place(tmp_path, times):
     for old, new in zip(np.tile(rows[list("xyz")], (len(found) // 2, 1)), places, strict=True):
         np.testing.assert_allclose(np.remainder(new - old + 1e-9, box[:, 1]), 1e-9, atol=1e-12)
     assert (found["vx"] == np.tile([1.0, -1.0], len(found) // 2)).all()
+
+
+def test_samples_of_earlier_runs_give_the_same_tables(modelled, tmp_path, capsys):
+    rows = samples(0.01, 1)
+    names = [Point(row.scene, row.engine, row.grains, row.cores, row.steps).name for row in rows.itertuples()]
+    rows = rows.assign(subject=names, rate=1e6)
+    for name, part in (("a", rows[rows["grains"] < 10**6]), ("b", rows[rows["grains"] == 10**6])):
+        (tmp_path / f"{name}.json").write_text(json.dumps({"rows": part.to_dict("records")}))
+    paths = [str(tmp_path / f"{name}.json") for name in "ab"]
+    assert main(["--samples", *paths, "--out", str(tmp_path / "both"), "--predict", "1e7", "--there", "64"]) == 0
+    _, row = modelled(0.01, 1)
+    page = (tmp_path / "both/mpi_scaling.md").read_text()
+    assert f"| {' | '.join(row)} |" in page and page.count("| 1e+07 | 64 |") == 1
 
 
 def test_only_beds_of_complete_tiles(lattice):
@@ -155,14 +169,16 @@ def test_the_model_finds_the_numbers_that_made_the_samples(modelled):
     assert set(row[-5:]) <= {"+0.0 %", "-0.0 %"}
 
 
-def test_intervals_hold_the_true_numbers_as_often_as_they_say(modelled):
-    held = []
+def test_intervals_hold_the_true_numbers_and_other_samples_as_often_as_they_say(modelled):
+    held, random = [], np.random.default_rng(7)
     for seed in range(300):
         model, _ = modelled(0.03, seed)
-        memory = model.resident(1e5, 1e4, 1e7)
+        grain, halves, memory = 1.0 + 0.03 * random.standard_normal(3)
+        # A rank whose time is nearly all its own grains': the two scatters are independent, and the sum of squares covers both.
         held.append([abs(found.value - true) < found.half for found, true in (
             (model.own.at(1.0), 200e-9), (model.halo.at(1.0, 0.0), 50e-9), (model.halo.at(0.0, 1.0), 20e-6),
-            (model.memory.at(1.0, 0.0), 1e3), (memory, 3e7 + 2e6 + 4e7 + 1e3 * 1.1e5))])
+            (model.memory.at(1.0, 0.0), 1e3), (model.resident(1e5, 1e4, 1e7), 3e7 + 4e7 + 2e6 + 1.1e8 * memory),
+            (model.step(1e5, 1e3), 200e-9 * 1e5 * grain + (50e-9 * 1e3 + 20e-6) * halves))])
     shares = np.mean(held, axis=0)
     assert (shares > 0.9).all() and (shares < 0.99).all(), shares
 
@@ -174,7 +190,9 @@ def test_a_prediction_adds_latency_and_bandwidth(modelled):
     assert model.between_nodes(halo, 256, network) == pytest.approx((2 * 2 + 2 * 8) * 1e-5 + 72 * halo / 1e8)
     # An imbalance makes all wait for the fullest rank.
     assert model.step(1e4, halo, 1.5).value - model.step(1e4, halo).value == pytest.approx(0.5 * 200e-9 * 1e4)
-    [row] = predicted({("bed", "lammps"): model}, [2560000], [256], network)
+    rows = predicted(dict.fromkeys([("bed", "lammps"), ("drum", "lammps")], model), [2560000, 1e7], [16, 256], network)
+    assert [row[0] for row in rows] == 4 * ["bed"] + 4 * ["drum"]
+    row = rows[1]
     seconds = 200e-9 * 1e4 + 50e-9 * halo + 20e-6 + model.between_nodes(halo, 256, network)
     assert row[2:4] == ["2.56e+06", "256"] and float(row[6].split()[0]) == pytest.approx(1e3 * seconds, rel=1e-2)
     assert float(row[8]) == pytest.approx(200e-9 * 1e4 / seconds, abs=0.01)
