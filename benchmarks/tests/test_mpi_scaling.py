@@ -1,6 +1,7 @@
 """Beds and drums that are repeated, the scaling tables, and what ranks of real engines account for."""
 
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pandas as pd
 import pytest
 
 from benchmarks import mpi_scaling
-from benchmarks.beds import Bed
+from benchmarks.beds import HERE, Bed
 from benchmarks.mpi_scaling import HEADS, Point, bed_of, cells, fitted, main, parsed, planned, predicted, read_grains, tiled, write_grains
 from benchmarks.scaling_model import Network
 from dembark.common.errors import DembarkError
@@ -84,6 +85,14 @@ def test_samples_are_about_the_same_work_and_more_ranks_than_cores_are_counted(m
     assert {point.grains * point.steps for point in points if point.engine == "liggghts" and point.cores < 8} == {10**6}
     assert {point.steps for point in points if point.cores == 8} == {0}
     assert {(point.scene, point.cores) for point in points if point.engine == "yade"} == {("bed", 1), ("bed", 2)}
+
+
+def test_commands_of_the_page_are_understood():
+    page = (HERE.parent / "docs/how-to/scaling.md").read_text(encoding="utf-8").replace("\\\n", "")
+    lines = [line for line in page.splitlines() if line.startswith(".venv/bin/python -m benchmarks.mpi_scaling")]
+    assert len(lines) == 4
+    for line in lines:
+        parsed(shlex.split(line)[3:])
 
 
 @pytest.mark.parametrize("words", [["--ranks", "0"], ["--rounds", "0"], ["--grains", "-5"], ["--grains", "1234", "--ranks", "1"]])

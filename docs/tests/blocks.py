@@ -169,6 +169,7 @@ NOT_RUN = (
     (r"apt-get install .*", "changes the system"),
     (r"build/lammps-kokkos/.*", "needs a LAMMPS with KOKKOS; plugins/lammps/tests/test_kokkos.py runs such decks"),
     (r"cmake .*", "compiles LAMMPS or the plugin; plugins/lammps/tests/test_own_build.py configures it"),
+    (r".*python -m benchmarks\..*", "takes minutes to hours; benchmarks/tests run and parse it"),
     (r".*pytest .*--(?:slow|full).*", "starts a Slurm as root and takes minutes; the folder exists"),
 )
 
