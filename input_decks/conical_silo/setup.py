@@ -19,7 +19,7 @@ def setup(p: Parameters) -> Setup:
     """The middle of the lip is the origin. A row of time.csv each 10 ms or more often; frames in the first half of the run."""
     modulus, (places, top) = p.youngs_modulus / p.softening, sites(p)
     step, soft_step = (time_step(SimpleNamespace(**{**vars(p), **given})) for given in ({"youngs_modulus": modulus}, FILLING))
-    duration = 1.15 * emptying(p) if p.duration is None else p.duration
+    duration = 1.3 * emptying(p) if p.duration is None else p.duration
     rows = 20 * p.frames * math.ceil(max(duration / 0.01, 200) / (20 * p.frames))
     every = math.ceil(duration / rows / step)
     stride = every * (rows // (2 * p.frames))
