@@ -145,8 +145,8 @@ def measure(replicas: Replicas) -> Measurement:
         return Estimate(mean, part * mean, rate.basis)
 
     halfway, last = (over_runs([run.when(share * p["grain_count"]) for run in runs]) for share in (0.5, 0.01))
-    values = {"rate": Value(rate), "mass_rate": Value(divided(rate, 1.0 / mass)), "bulk_density": Value(exact(density)),
-              "halfway": Value(halfway), "beverloo_c": Value(divided(rate, law), exact(C)),
+    values = {"rate": Value(rate), "mass_rate": Value(divided(rate, 1.0 / mass)), "halfway": Value(halfway),
+              "bulk_density": Value(Estimate(density, math.inf, "one frame")), "beverloo_c": Value(divided(rate, law), exact(C)),
               "left_at_end": Value(exact(max(run.left[-1] for run in runs) / p["grain_count"]), exact(0.0)),
               "leaked": Value(exact(max(map(leaked, replicas))), exact(0.0)),
               "unaccounted": Value(exact(max(map(unaccounted, replicas))), exact(0.0))}

@@ -100,7 +100,7 @@ def test_the_rate_of_the_narrow_silo_gives_the_constant_and_exponent_of_beverloo
 
 def points(exponent: float = 2.5) -> list[dict[str, Any]]:
     """Rates that grow with this power."""
-    silos = [defaults("conical_silo", lip_radius=radius) for radius in (0.016, 0.02, 0.024)]
+    silos = [defaults("conical_silo", lip_radius=radius) for radius in (0.012, 0.016, 0.02)]
     return [point(p, {"rate": 1e3 * (silo.opening(p) / silo.opening(silos[0])) ** exponent}, part=0.01, variant="") for p in silos]
 
 
