@@ -38,6 +38,8 @@ def _asked(what: str, question: Callable[[], str], required: bool = True) -> Fin
 
 
 def _engine(name: str) -> str:
+    if later := engines.engine_class(name).pending():
+        return later
     engine = engines.find(name)
     return f"{engine.version} ({engine.executable})"
 
@@ -55,7 +57,7 @@ def _packages(extra: str, names: tuple[str, ...]) -> Finding:
 def _parts(facts: engines.EngineFacts) -> list[Finding]:
     """What the engine lacks that its users may know from other builds; nothing where it is not installed."""
     try:
-        lacking = ", ".join(engines.find(facts.name).lacking())
+        lacking = "" if engines.engine_class(facts.name).pending() else ", ".join(engines.find(facts.name).lacking())
     except DembarkError:
         return []
     advice = f"built without {lacking}; no case needs them; {facts.own_build}"

@@ -84,6 +84,11 @@ def test_wheel_holds_all_files_of_the_packages(tmp_path):
 def test_wheel_works_in_an_empty_environment(tmp_path):
     wheel = build(tmp_path / "wheel")
     assert not [name for name in zipfile.ZipFile(wheel).namelist() if name.endswith(".pth")], "paths of this checkout in the wheel"
+    # And what `dembark` builds its plugin for LAMMPS from.
+    plugin = {name.removeprefix("dembark/plugins/") for name in zipfile.ZipFile(wheel).namelist() if name.startswith("dembark/plugins/")}
+    sources = {f"{folder}/{name}" for folder in ("lammps", "lammps_family", "physics") for name in files(ROOT / "plugins" / folder)
+               if name.endswith((".h", ".hpp", ".cpp", ".in")) and not {"kokkos", "python"} & set(Path(name).parts)}
+    assert plugin == sources | {"lammps/CMakeLists.txt", "packaging/build.py", "packaging/build_weights.txt"}
     venv.create(tmp_path / "env", with_pip=True)
     python = tmp_path / "env/bin/python"
     subprocess.run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-index", "--no-deps", wheel], check=True)

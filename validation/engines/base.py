@@ -64,6 +64,8 @@ class EngineFacts:
     executable: str = ""
     built: str = ""
     target: str = ""
+    # The extra of the Python package that brings it where there is no checkout.
+    extra: str = ""
     # What brings parts that the program found may lack.
     own_build: str = ""
     on_path: bool = False
@@ -148,8 +150,16 @@ class Engine(ABC):
             return here
         if facts.on_path and (elsewhere := shutil.which(facts.executable)):
             return Path(elsewhere)
+        way = f"build it with '{facts.target}'" + ("" if tree else " in a checkout of dembark")
+        if facts.extra and not tree:
+            way = f"pip install 'dembark[{facts.extra}]'"
         raise DembarkError(f"{facts.program} not found", f"{here or 'it'} is not there" + (", nor is it on PATH" if facts.on_path else ""),
-                           f"build it with '{facts.target}' or set {facts.variables[0]} to its executable")
+                           f"{way} or set {facts.variables[0]} to its executable")
+
+    @classmethod
+    def pending(cls) -> str:
+        """What is there when the first run has yet to build dembark's part; empty otherwise. DembarkError when that cannot be done."""
+        return ""
 
     @classmethod
     def find(cls) -> Self:
