@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from dembark.common.checkout import checkout
 from dembark.common.errors import DembarkError
 from dembark.validation import engines, provenance
 from dembark.validation.case import folders
@@ -80,7 +81,7 @@ def examine() -> list[Finding]:
         Finding("Python", platform.python_version() if sys.version_info >= (3, 11) else None, advice="Python 3.11 or newer is needed"),
         *(_packages(extra, names) for extra, names in _PACKAGES.items()),
         *(finding for facts in map(engines.facts, engines.names())
-          for finding in (_asked(facts.program, partial(_engine, facts.name), not facts.optional), *_parts(facts))),
+          for finding in (_asked(facts.program, partial(_engine, facts.name), bool(checkout()) and not facts.optional), *_parts(facts))),
         _asked("cases", _decks),
         Finding("mpirun", mpirun, False, "install openmpi-bin to use --ranks"),
         Finding("Slurm", shutil.which("sbatch"), False, "only on clusters; campaigns run here without it"),

@@ -51,19 +51,19 @@ std::string text(double value) {
 std::string text(const Vec3<double>& v) { return text(v.x) + text(v.y) + text(v.z); }
 
 std::vector<std::string> script() {
-  std::vector<std::string> lines = {
-      "units si",
-      "atom_style sphere",
-      "boundary f f f",
-      "newton off",
-      "comm_modify vel yes",
-      "region domain block -0.02 0.22 -0.02 0.02 -0.02 0.02 units box",
-      "create_box 1 domain",
-      "neighbor 0.001 bin",
-      "pair_style dembark/granular presliding partial_slip rolling_resistance elastic_plastic",
-      "pair_coeff * * youngs_modulus 5e6 poissons_ratio 0.3 restitution 0.5 static_friction 0.6 kinetic_friction 0.5 "
-      "interface_shear_strength 1e5 rolling_friction 0.1",
-      "timestep" + text(dt)};
+  std::vector<std::string> lines = {"units si",
+                                    "atom_style sphere",
+                                    "boundary f f f",
+                                    "newton off",
+                                    "comm_modify vel yes",
+                                    "region domain block -0.02 0.22 -0.02 0.02 -0.02 0.02 units box",
+                                    "create_box 1 domain",
+                                    "neighbor 0.001 bin",
+                                    "pair_style dembark/granular presliding partial_slip rolling_resistance elastic_plastic",
+                                    "pair_coeff * * youngs_modulus 5e6 poissons_ratio 0.3 restitution 0.5 static_friction 0.6 "
+                                    "kinetic_friction 0.5 critical_slip_distance 1e-5 "
+                                    "interface_shear_strength 1e5 rolling_friction 0.1",
+                                    "timestep" + text(dt)};
   const auto grain = [&](int id, const Vec3<double>& x, double radius, const Vec3<double>& v, const Vec3<double>& spin) {
     lines.push_back("create_atoms 1 single" + text(x) + " units box");
     lines.push_back("set atom " + std::to_string(id) + " diameter" + text(2.0 * radius) + " density" + text(density) + " vx" + text(v.x) +
@@ -141,7 +141,9 @@ std::string self_test(void (*initialize)(void*, void*, void*)) {
     for (const std::string& line : script()) lammps->input->one(line);
     return compare(lammps);
   } catch (const std::exception& wrong) {
-    return wrong.what();
+    // LAMMPS adds the line of the script.
+    const std::string text = wrong.what();
+    return text.substr(0, text.find('\n'));
   }
 }
 

@@ -150,11 +150,12 @@ class Engine(ABC):
             return here
         if facts.on_path and (elsewhere := shutil.which(facts.executable)):
             return Path(elsewhere)
-        way = f"build it with '{facts.target}'" + ("" if tree else " in a checkout of dembark")
-        if facts.extra and not tree:
-            way = f"pip install 'dembark[{facts.extra}]'"
-        raise DembarkError(f"{facts.program} not found", f"{here or 'it'} is not there" + (", nor is it on PATH" if facts.on_path else ""),
-                           f"{way} or set {facts.variables[0]} to its executable")
+        if here:
+            where, way = f"{here} is not there" + (", nor is it on PATH" if facts.on_path else ""), f"build it with '{facts.target}'"
+        else:
+            where = "it is not on PATH" if facts.on_path else ""
+            way = f"pip install 'dembark[{facts.extra}]'" if facts.extra else f"build it with '{facts.target}' in a checkout of dembark"
+        raise DembarkError(f"{facts.program} not found", where, f"{way} or set {facts.variables[0]} to its executable")
 
     @classmethod
     def pending(cls) -> str:

