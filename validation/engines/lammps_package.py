@@ -41,7 +41,7 @@ class Package:
     @property
     def store(self) -> Path:
         """The folder of the plugin for this version, this dembark and this C++ compiler: `bin` and `lammps` are below it."""
-        total = hashlib.sha256(f"{self.folder} {self.version} {os.environ.get('CXX', '')}".encode())
+        total = hashlib.sha256(f"{_sources()} {self.folder} {self.version} {os.environ.get('CXX', '')}".encode())
         for name in ("lammps", "lammps_family", "physics"):
             for path in sorted((_sources() / name).rglob("*")):
                 if path.is_file() and path.suffix in {".h", ".hpp", ".cpp", ".in", ".txt"}:

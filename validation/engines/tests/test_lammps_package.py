@@ -82,6 +82,17 @@ def test_another_compiler_or_release_has_its_own_plugin(package, monkeypatch):
     assert package.store != first
 
 
+def test_the_same_sources_elsewhere_have_their_own_plugin(package, tmp_path, monkeypatch):
+    """CMake goes on only with the sources where they were."""
+    found = set()
+    for name in ("one", "two"):
+        (tmp_path / name / "lammps").mkdir(parents=True)
+        (tmp_path / name / "lammps/plugin.cpp").write_text("")
+        monkeypatch.setattr(lammps_package, "_sources", lambda name=name: tmp_path / name)
+        found.add(package.store)
+    assert len(found) == 2
+
+
 def test_a_build_that_fails_is_one_line_and_leaves_no_program(package, capfd):
     """The package's folder is empty: CMake does not find LAMMPS's headers."""
     with pytest.raises(DembarkError, match=r"did not build.*build\.log"):
