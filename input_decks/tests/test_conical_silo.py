@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -126,6 +127,16 @@ def test_a_small_silo_stays_shut_and_then_empties(engine: str, simulate: Any) ->
     assert np.median(np.abs(first.velocities)) < 9.81 * rows["time"][0] and 1300.0 < silo.bulk_density(one) < 1600.0
     # At the end of the run few grains are still falling below the lip.
     assert rows["present"][-1] < 200 and run.rate().value == pytest.approx(2900.0, rel=0.2)
+
+
+@pytest.mark.parametrize("engine", CASE.engines)
+def test_a_run_that_has_lost_grains_resumes_exactly(engine: str, decks: Any, tmp_path: Path) -> None:
+    one = decks("conical_silo", engine, tmp_path / engine, SMALL | {"grain_count": 200})
+    one.run(restart_every=1000)
+    before = {name: (one.folder / name).read_bytes() for name in ("time.csv", "grains.dump")}
+    assert one.replica().times()["present"][-1] < 200
+    assert re.search(r"dembark: resumed at step \d+ exactly", one.run(restart_every=1000, resume="yes"))
+    assert {name: (one.folder / name).read_bytes() for name in before} == before
 
 
 def controls_conical_silo(_folder: Path) -> Iterator[Control]:
