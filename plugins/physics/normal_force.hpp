@@ -44,7 +44,7 @@ template <class Real, class Truth>
 DEMBARK_HOT Real reduced(Real a, Real b, Truth a_infinite, Truth b_infinite) {
   return select(b_infinite, a, select(a_infinite, b, a * b / (a + b)));
 }
-DEMBARK_FUNCTION inline double reduced(double a, double b) { return reduced(a, b, bool(std::isinf(a)), bool(std::isinf(b))); }
+DEMBARK_FUNCTION inline double reduced(double a, double b) { return reduced(a, b, std::isinf(a), std::isinf(b)); }
 
 /// What the normal contact hands on to the tangential law.
 template <class Real>

@@ -100,9 +100,10 @@ void each_choice(ContactOptions& options, Visit visit) {
   DEMBARK_CONTACT_CHOICES(DEMBARK_VISIT)
 #undef DEMBARK_VISIT
 }
-#define DEMBARK_ONE(...) +1
-inline constexpr int contact_choice_count = DEMBARK_CONTACT_CHOICES(DEMBARK_ONE);
-#undef DEMBARK_ONE
+#define DEMBARK_NAME(name, ...) #name,
+inline constexpr const char* contact_choices[] = {DEMBARK_CONTACT_CHOICES(DEMBARK_NAME)};
+#undef DEMBARK_NAME
+inline constexpr int contact_choice_count = sizeof(contact_choices) / sizeof(*contact_choices);
 
 /// Where an engine keeps the numbers of a pair of types.
 class ContactSource {
