@@ -5,8 +5,9 @@
 #   packaging/lammps.sh --where   the same without installing; fails when there is none
 #
 # A group's own LAMMPS is named by LAMMPS_EXECUTABLE (a program with the package PLUGIN) and LAMMPS_SOURCE_DIR (the source it was built
-# from, for its headers); its MPI is that of mpicxx on PATH. It is the release of 29 Aug 2024 or a later one. LAMMPS_INSTALLED=ON stands for an installed package without PLUGIN, such as Debian 13's liblammps-dev. The environment
-# is made by SYSTEM_PYTHON, /usr/bin/python3 unless it is set.
+# from, for its headers); its MPI is that of mpicxx on PATH. It must be the release of 29 Aug 2024 or a later one. LAMMPS_INSTALLED=ON
+# selects an installed package without PLUGIN, such as Debian 13's liblammps-dev. SYSTEM_PYTHON makes the environment, /usr/bin/python3
+# unless it is set.
 set -euo pipefail
 
 here=$(cd "$(dirname "$0")" && pwd)

@@ -20,7 +20,7 @@ SIDE, LAYERS = 10, 4
 
 @pytest.fixture
 def lattice(tmp_path, monkeypatch) -> Bed:
-    """A layer of grains on a square lattice in the place of the settled bed."""
+    """A layer of grains on a square lattice instead of the settled bed."""
     place = 0.005 * (np.stack(np.meshgrid(*map(np.arange, (SIDE, SIDE, LAYERS)), indexing="ij"), -1).reshape(-1, 3) + 0.5)
     grains = pd.DataFrame(place * (1.0, 1.0, 0.999), columns=list("xyz")).assign(diameter=0.005)
     bed = Bed(tmp_path / "bed.data", width=0.05)

@@ -9,8 +9,8 @@
 
 namespace dembark::sph {
 
-/// For a process that has all particles. Where processes share them, in its place stands what sends the numbers of particles to their
-/// images on others.
+/// For a process that has all particles. Where processes share them, the engine gives an object of the same form, which sends the numbers
+/// of particles to their images on other processes.
 struct OneProcess {
   void send_densities(Scene&) const {}  ///< of fluid and solids[0]
   void send_walls(Scene&) const {}      ///< `pressure` and `met` of solids[0]
