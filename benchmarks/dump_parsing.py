@@ -59,12 +59,12 @@ def _blocks(path: Path) -> Iterator[str]:
 
 
 def by_text_dump(path: Path) -> float:
-    """The reader that maps the file."""
+    """TextDump, which indexes the frames first."""
     return sum(float(raw.values[:, 2].sum()) for raw in TextDump(path))
 
 
 def by_stream(path: Path) -> float:
-    """The reader that holds one frame at a time."""
+    """TextDump without an index."""
     return sum(float(raw.values[:, 2].sum()) for raw in TextDump(path, stream=True))
 
 

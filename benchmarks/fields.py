@@ -80,7 +80,7 @@ def parsed(words: Sequence[str] | None) -> argparse.Namespace:
     given = parser.parse_args(words)
     frame.at_least_one(given, "cells")
     if given.edge < 3:
-        raise DembarkError("--edge out of range", "", "edge >= 3")
+        raise DembarkError("--edge is out of range", "", "give at least 3")
     return given
 
 

@@ -97,7 +97,7 @@ def at_least_one(given: argparse.Namespace, *names: str) -> None:
     """DembarkError when one of these options is smaller than 1."""
     for name in ("rounds", *names):
         if getattr(given, name) < 1:
-            raise DembarkError(f"--{name}", "", "give a number from 1 on")
+            raise DembarkError(f"--{name} is too small", "", "give at least 1")
 
 
 def ended(work: Callable[[], int | None]) -> int:

@@ -1,4 +1,4 @@
-"""Siconos's LCP solvers on one stored problem, timed inside: `/usr/bin/python3 lcp_siconos.py problem.npz method ...` prints JSON.
+"""Siconos's LCP solvers on one stored problem, timed inside: `/usr/bin/python3 lcp_siconos.py problem.npz wall|cpu method ...` prints JSON.
 
 A program of its own because Debian's Siconos belongs to the system's Python.
 """

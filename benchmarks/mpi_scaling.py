@@ -158,9 +158,10 @@ def drum_of(bed: Bed) -> Bed:
 
 def bed_of(scene: str, grains: int) -> Bed:
     """The bed or drum of `grains`."""
-    count, rest = divmod(grains, SLICE if scene == "drum" else TILE)
+    smallest = SLICE if scene == "drum" else TILE
+    count, rest = divmod(grains, smallest)
     if rest or not count:
-        raise DembarkError(f"--grains {grains}", "", f"give a multiple of {SLICE}")
+        raise DembarkError(f"--grains {grains} do not fill a {scene}", "", f"give a multiple of {smallest}")
     base = settled_bed(TILE, base=BASE)
     one = drum_of(base) if scene == "drum" else base
     across = next(k for k in range(math.isqrt(count), 0, -1) if count % k == 0)
@@ -261,7 +262,7 @@ def parsed(words: list[str] | None) -> argparse.Namespace:
     frame.at_least_one(given, "relax", "work", "least")
     for name in ("grains", "ranks", "predict", "there"):
         if min(getattr(given, name)) < 1:
-            raise DembarkError(f"--{name}", "", "give numbers from 1 on")
+            raise DembarkError(f"--{name} has a number that is too small", "", "give numbers from 1 on")
     return given
 
 

@@ -94,7 +94,7 @@ def parsed(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--wall-clock", action="store_true", help="LIGGGHTS's timers as they are; default: processor time")
     given = parser.parse_args(words)
     if not 1.0 <= given.size_ratio <= 20.0:
-        raise DembarkError("--size-ratio", "", "give a number from 1 to 20")
+        raise DembarkError("--size-ratio is out of range", "", "give a number from 1 to 20")
     if given.size_ratio != 1.0 and "wet" in (given.only or ()):
         raise DembarkError("--size-ratio", "with --only wet", "is for dry beds: bridges of the stock model grow with the spheres")
     frame.at_least_one(given, "count", "steps", "relax")

@@ -1,12 +1,13 @@
 """The settled bed in YADE under one contact law, timed.
 
-    yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING [loop=SphereContactLoop] [step=S] ...
+    yade -n -j1 -x yade_bed.py bed=FILE law=stock|dembark|PRESLIDING relax=STEPS steps=STEPS samples=N [loop=SphereContactLoop] [step=S]
 
 Prints one line of JSON a sample: processor time of the loop and of the interaction loop (its share of the loop by the engine's
 own timers), in seconds.
 """
 
 import json
+import math
 import sys
 import time
 

@@ -151,9 +151,11 @@ def check_times(path: Path) -> int:
     rows = list(csv.reader(text.splitlines()))
     if len(rows) < 2 or rows[0][:3] != ["step", "time", "kinetic_energy"]:
         raise RunError(f"{path.name} has no rows, or no header step,time,kinetic_energy,...")
-    if not text.endswith("\n") or any(len(row) != len(rows[0]) for row in rows):
+    if not text.endswith("\n"):
         raise RunError(f"{path.name} is truncated after {len(rows) - 2} rows")
-    for row in rows[1:]:
+    for number, row in enumerate(rows[1:], start=1):
+        if len(row) != len(rows[0]):
+            raise RunError(f"{path.name} has {len(row)} columns in row {number} of {len(rows) - 1}, its header {len(rows[0])}")
         if not _finite(row):
             raise RunError(f"the run became unstable: {path.name} holds no finite number at step {row[0]}")
     return len(rows) - 1

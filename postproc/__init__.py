@@ -1,7 +1,7 @@
 """Reading what the engines wrote and turning it into fields: plain numpy arrays in SI units, whichever engine ran.
 
-`GrainsDump`, `ContactsDump` and `read_times` read a run folder; `universe` opens its grains in MDAnalysis; `profiles` and `stress`
-hold the fields.
+`GrainsDump`, `ContactsDump` and `read_times` read a run folder; `universe` opens its grains in MDAnalysis; `fields` holds
+coarse graining; `profiles` and `stress` sum over slabs.
 """
 
 from .contacts import ContactFrame, ContactsDump

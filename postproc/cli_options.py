@@ -186,7 +186,7 @@ class _WallOptions:
             return CylinderWall(self.name, radius, self.vector("axis", "1", _UPWARD), self.vector("origin", "m", _ORIGIN),
                                 "outside" not in self.options, motion)
         if self.options.get("by", "triangle") not in ("triangle", "group"):
-            raise DembarkError(f"patches by {self.options['by']!r}", f"in {self.where}", "they are by triangle or by group")
+            raise DembarkError(f"there are no patches by {self.options['by']!r}", f"in {self.where}", "they are by triangle or by group")
         return MeshWall.from_stl(self.name, Path(self.needed("file")), scale=self.unit(), motion=motion)
 
     def needed(self, key: str) -> str:
@@ -222,7 +222,7 @@ class _WallOptions:
         """The unit (m) of the file of a mesh."""
         unit = self.options.get("unit", "m")
         if unit not in (*STL_UNITS, "d"):
-            raise DembarkError(f"unit={unit}", f"in {self.where}", f"it must be {', '.join(STL_UNITS)} or d (mean diameters)")
+            raise DembarkError(f"unit={unit} is unknown", f"in {self.where}", f"it must be {', '.join(STL_UNITS)} or d (mean diameters)")
         return STL_UNITS.get(unit, self.diameter)
 
     def ids(self) -> tuple[int, ...]:

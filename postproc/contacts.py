@@ -24,7 +24,7 @@ _NUMBERED = re.compile(r"\w+\[(\d+)\]")
 # What local/gran/vtk writes.
 _LINES: Mapping[str, Column] = {"first": ("x1", "y1", "z1"), "second": ("x2", "y2", "z2"), "ids": ("id1", "id2"),
                                 "forces": ("force[1]", "force[2]", "force[3]")}
-# The flag `periodic`, counted from 0: the nearest image says the same.
+# The flag `periodic` (columns counted from 0) is not needed: the nearest image says the same.
 _DECK_LEFT_OUT = {8}
 
 

@@ -38,10 +38,6 @@ class Convergence:
     extrapolated: float | None
     uncertainty: float | None
 
-    def relative(self, value: float) -> float | None:
-        """The uncertainty over |value|, the grid convergence index; None without one."""
-        return None if self.uncertainty is None or value == 0.0 else self.uncertainty / abs(value)
-
 
 def refinement(parameter: str, value: float) -> float:
     """The size h of the numerical error's source for a setting of `parameter`, up to a constant; KeyError for other parameters."""

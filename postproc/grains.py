@@ -164,8 +164,8 @@ def _positions(table: _Table, say: Say) -> tuple[Array, Array]:
 
 
 def _images(table: _Table, say: Say) -> Array:
-    """How many periods each grain has gone along each axis. Where the file does not say which axes are periodic, those that have such
-    numbers are."""
+    """How many periods each grain has gone along each axis. Where the file does not say which axes are periodic, those with such numbers
+    are taken as periodic."""
     images, raw = table(*_IMAGES), table.raw
     unused = [axis for axis in range(3) if raw.flagged and not raw.periodic[axis] and images[:, axis].any()]
     if unused:

@@ -21,8 +21,8 @@ def read_times(path: str | Path) -> dict[str, NDArray[np.float64]]:
         with path.open(encoding="ascii") as handle:
             names = handle.readline().strip().split(",")
             values = np.loadtxt(handle, delimiter=",", ndmin=2)
-    except OSError:
-        raise DumpError(f"{path} does not exist") from None
+    except OSError as error:
+        raise DumpError(f"{path} cannot be read: {error.strerror}") from None
     except ValueError as error:
         raise DumpError(f"{path} cannot be read: {error}") from None
     if names[:3] != ["step", "time", "kinetic_energy"] or values.shape[0] == 0 or values.shape[1] != len(names):

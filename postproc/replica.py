@@ -65,8 +65,8 @@ class Replica:
         try:
             rows = [line.split() for line in path.read_text(encoding="ascii").splitlines() if not line.startswith("#")]
             table = np.array(rows, float).reshape(len(rows), 11)
-        except OSError:
-            raise DumpError(f"{path} does not exist") from None
+        except OSError as error:
+            raise DumpError(f"{path} cannot be read: {error.strerror}") from None
         except ValueError:
             raise DumpError(f"{path}: a line does not hold 11 numbers") from None
         table[:, :2] += int(self.record.get("impact_id_offset", 0)) * (table[:, :2] >= 0)

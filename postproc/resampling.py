@@ -17,8 +17,8 @@ def resampled(measure: Callable[[NDArray[np.bool_], NDArray[np.bool_]], float], 
               overlap: float = 1.0) -> Estimate:
     """`measure(keep_frames, keep_places)` with an interval from what varies in time and, with `places`, from place to place.
 
-    `overlap` is what sharing samples leaves of the variance among places. The wider of the two
-    jackknife intervals counts: places stand for the disorder of the packing, which time does not average out, and what is left of the
+    `overlap`: variance among places that share samples, over that among independent ones. The wider of the two jackknife intervals counts:
+    places stand for the disorder of the packing, which time does not average out, and what is left of the
     variation in time is in their differences too; blocks of time add what all places do together.
     """
     everywhere = np.ones(0 if places is None else len(places), bool)
@@ -40,8 +40,8 @@ def pooled(replicas: Sequence[Mapping[str, Estimate]], name: str) -> Estimate:
 def profile(name: str, title: str, along: str, across: str, place: Array, values: Sequence[Array], *, half: Array | None = None,
             vertical: bool = False, reference: Array | None = None, reference_half: Array | None = None, reference_label: str = "",
             note: str = "") -> dict[str, Any]:
-    """A profile for figure and CSV: `values` of each replica at the same `place`; the band is Student's interval over replicas (three or
-    more), the range of two, or for one the half-widths `half` of its 95 % intervals, where all are known.
+    """A profile for figure and CSV: `values` of each replica at the same `place`. The band: the half-widths `half` of 95 % intervals, where
+    given and all known; else Student's interval over three or more replicas, or the range of two.
 
     `along` and `across` label the axes of place and value; `vertical` draws the place upwards. `reference_half`: half-widths of the 95 %
     intervals of a measured `reference`.

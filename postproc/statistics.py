@@ -20,7 +20,7 @@ ONE_SAMPLE = "4 time blocks, too correlated to count as more than one sample"
 _MIN_BLOCKS = 4
 _MOST_BLOCKS = 20  # of a plain mean; where every block is measured once more, ten will do
 _BLOCK_LENGTH = 3.5  # correlation times
-_WINDOW = 2.5  # correlation times, which count both sides here: five of Sokal's
+_WINDOW = 2.5  # correlation times, summed over both signs of the lag: Sokal's five integrated times
 
 
 @dataclass(frozen=True)
@@ -245,8 +245,8 @@ def steady_start(series: Array, batch: int = 5) -> int:
     # About the overall mean, for differences of large squares would lose the small ones.
     total = np.cumsum((means - means.mean())[::-1])[::-1]
     squares = np.cumsum(((means - means.mean()) ** 2)[::-1])[::-1]
-    error = np.maximum(0.0, squares - total**2 / rest) / rest.astype(float) ** 2
-    start = int(np.argmin(error[: count // 2 + 1])) * batch
+    mser = np.maximum(0.0, squares - total**2 / rest) / rest.astype(float) ** 2
+    start = int(np.argmin(mser[: count // 2 + 1])) * batch
     blocks = np.array([part.mean() for part in np.array_split(values[start:], 10)])
     one, other = blocks[:5], blocks[5:]
     error = math.sqrt((one.var(ddof=1) + other.var(ddof=1)) / 5.0)

@@ -83,7 +83,9 @@ def mean_load_above(heights: Array, loads: Array, edges: Array) -> Array:
 
 
 def plane_wall_stress(heights: Array, wall_forces: Array, axis: int, side: int, edges: Array, depth: float) -> tuple[Array, Array]:
-    """The same for a vertical plane wall normal to `axis`; `side` = +1 when the grains lie on its positive side, else -1; `depth` (m)."""
+    """Normal and shear stress in Pa ((k,), (k,)) on a vertical plane wall normal to `axis`, in bands of height between `edges` (k + 1,) in
+    m, from the `heights` (n,) in m of grains and the `wall_forces` (n, 3) in N on them. `side` = +1 when the grains lie on its positive
+    side, else -1; `depth` of the wall in m."""
     area = depth * np.diff(edges)
     return _binned(heights, side * wall_forces[:, axis], edges) / area, _binned(heights, wall_forces[:, 2], edges) / area
 

@@ -154,7 +154,7 @@ def make_report(
     if (folder / CAMPAIGN_FILE).is_file():
         restore(folder)
     if not any(folder.glob("*/*/*/metrics.json")) and not any(folder.glob("*/*/*/replica-*/run.json")):
-        raise DembarkError(f"no results in {folder}", "", "give a campaign's folder; single runs have metrics.json" if directory else
+        raise DembarkError(f"no results in {folder}", "", "give the folder of a campaign; a run has its metrics.json" if directory else
                            f"run 'dembark validate --profile {profile}' first, or give --results")
     outcome = workflow.conclude(folder, workflow.cancelled_by_signal(), os.cpu_count() or 1)
     for line in outcome.problems:

@@ -31,7 +31,8 @@ class State:
     """A run, or another `kind` of step: waiting, running, stopped (ended from outside, to be continued), failed or finished.
 
     `folder`: place of the run in the results; `inputs`: hash of its inputs; `estimate`: expected wall time (s). `began` and `ended` are s
-    since 1970. `attempt` counts the starts, `resumed_from` is the step at which the last one went on.
+    since 1970; of a finished run that was read from its record, 0 and its wall time. `attempt` counts the starts, `resumed_from` is the
+    step at which the last one went on.
     """
 
     name: str
@@ -52,8 +53,8 @@ class State:
 
     @property
     def took(self) -> float:
-        """Wall time (s) between its begin and its end."""
-        return self.ended - self.began
+        """Wall time (s) between its begin and its end; 0 where that is unknown."""
+        return self.ended - self.began if self.ended else 0.0
 
     @property
     def left(self) -> float | None:
@@ -122,7 +123,7 @@ def _state(results: Path, run: Mapping[str, Any]) -> State:
     if lock_file(place).exists() and is_held(lock_file(place)):
         return State(**known | {"state": "running", "message": ""})
     if known.get("state") == "running":
-        known |= {"state": "stopped", "message": "its process was ended", "ended": known.get("began", 0.0)}
+        known |= {"state": "stopped", "message": "its process was ended"}
     return State(**known)
 
 
@@ -145,7 +146,7 @@ def runs(folder: Path | str) -> pd.DataFrame:
         else:
             row = {key: value for key, value in planned_state.as_json().items() if key not in ("name", "kind", "host", "began", "ended")}
             content = content if planned_state.state == "finished" else {}
-        parts = (folder / place).parts
+        parts = ("", "", "", *Path(place).parts)
         named = dict(zip(("case", "variant", "engine"), parts[-4:-1], strict=True)) | {"replica": int(place.rpartition("-")[2])}
         rows.append(named | row | {key: content[key] for key in ("case", "variant", "engine", "steps", "time_step", "resume", "parameters",
                                                                 "provenance") if key in content})

@@ -4,7 +4,7 @@ of the slope is the origin. s: distance along the floor, negative on the slope; 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,8 @@ from scipy.optimize import minimize_scalar
 from dembark.input_decks.common.heaps import EDGE
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array, Estimate
-from dembark.postproc.statistics import jackknife, time_blocks
+from dembark.postproc.resampling import resampled
+from dembark.postproc.statistics import time_blocks
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,7 @@ def mean_power(height: Array, masses: Array, momenta: Array) -> Estimate:
         return profile_power(height[there], momenta[keep].sum(axis=0)[there] / mass[there])
 
     blocks = time_blocks(momenta.sum(axis=1) / masses.sum(axis=1))
-    found = jackknife(power, blocks.groups, name="time blocks")
-    return replace(found, half=blocks.widening * found.half)
+    return resampled(lambda keep, _: power(keep), blocks)
 
 
 def layers(frame: GrainFrame, diameter: float) -> tuple[Array, Array]:

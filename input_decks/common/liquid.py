@@ -10,8 +10,8 @@ from dembark.postproc.measurement import Array, Estimate, Replica, Value, block_
 
 
 def liquid_values(replicas: Sequence[Replica]) -> dict[str, Value]:
-    """`liquid_total`, change over the run; `bridge_count` a grain and the part `liquid_in_bridges` over its second half. None when
-    bridges have volumes of their own."""
+    """`liquid_total`, change over the run; `bridge_count` a grain and the part `liquid_in_bridges` over its second half. Empty
+    when bridges have volumes of their own."""
     if not float(replicas[0].parameters.get("liquid_content") or 0.0) > 0.0:
         return {}
     tables, grains = [replica.times() for replica in replicas], float(replicas[0].parameters["grain_count"])

@@ -128,7 +128,7 @@ class Drive:
         return self.reached(self.powers())
 
     def rise_time(self) -> float:
-        """Periods until the rise is."""
+        """Periods until the rise is steady."""
         return self.reached(self._means(self.heights()))
 
 
@@ -156,7 +156,7 @@ def transients(runs: list[Drive]) -> list[Curve]:
 
 
 def phases(runs: list[Drive], block: Block | None) -> Curve:
-    """Curve of the force on the plate over the phase; reference: none while the sticking block of this acceleration flies."""
+    """Curve of the force on the plate over the phase; its note says how long a sticking block of this acceleration flies."""
     forces = [one.rows["plate_fz"][one.ends[one.steady] + 1 : one.ends[-1] + 1].reshape(len(one.ends) - 1 - one.steady, -1).mean(axis=0)
               / one.weight for one in runs]
     phase: Any = (np.arange(len(forces[0])) + 1.0) / len(forces[0])

@@ -4,6 +4,7 @@ Eulerian means weigh each grain by its exact volume in the cell, Lagrangian ones
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -16,6 +17,7 @@ from scipy.optimize import least_squares
 from dembark.common.errors import RunError
 from dembark.postproc import ContactFrame, GrainFrame, profiles, stress
 from dembark.postproc.fields.coarse_graining import WallContacts, rows_of
+from dembark.postproc.history import reached
 from dembark.postproc.replica import Array, Replica, cached_per_replica
 from dembark.postproc.resampling import profile, resampled
 from dembark.postproc.spheres import slice_volumes, volume
@@ -141,12 +143,8 @@ class Channel:
         """Distance from the wall in d at which the deficit has fallen to a tenth of its greatest value."""
         place, deficit = self.deficit(frames, bands)
         top = int(np.argmax(deficit))
-        below = np.nonzero(deficit[top:] <= 0.1 * deficit[top])[0]
-        if not len(below):
-            return 0.5 * self.width / self.diameter
-        last = top + int(below[0])
-        share = (deficit[last - 1] - 0.1 * deficit[top]) / (deficit[last - 1] - deficit[last])
-        return float(place[last - 1] + share * (place[last] - place[last - 1])) / self.diameter
+        found = reached(place[top:], -deficit[top:], -0.1 * deficit[top])
+        return (0.5 * self.width if math.isnan(found) else found) / self.diameter
 
     def inertial(self, frames: Mask, bands: Bands = ALL) -> float:
         """Inertial number of the core: the steeper of the mean slopes of v in its two halves, the mean pressure in the core."""

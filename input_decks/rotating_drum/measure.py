@@ -8,6 +8,7 @@ import numpy as np
 
 from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import ordered
+from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
 from dembark.postproc.statistics import jackknife
 from dembark.postproc.studies import compared, measured
@@ -34,8 +35,7 @@ def tracked_profile() -> tuple[Array, Array]:
 
 def change_of_sign(n: Array, u: Array) -> float:
     """n (m) below the layer of the tracked points at which their speed is 0."""
-    first = int(np.nonzero(u < 0.0)[0][0])
-    return float(n[first] - (n[first] - n[first - 1]) * u[first] / (u[first] - u[first - 1]))
+    return reached(n, -u, 0.0)
 
 
 def fluxes() -> tuple[float, float]:

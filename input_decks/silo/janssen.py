@@ -30,7 +30,8 @@ def fitted_friction(depth: Array, shares: Array) -> float:
 
 
 def two_parameter(depth: Array, length: float, onset: float, weight: float = 1.0) -> Array:
-    """The same with a hydrostatic zone down to the depth `onset` (m), exponential below it (Walker 1966, Vanel & Clement 1999)."""
+    """Vertical stress in Pa at `depth` (m), hydrostatic down to `onset` (m), exponential with `length` (m) below it (Walker 1966,
+    Vanel & Clement 1999)."""
     return np.where(depth < onset, weight * depth, weight * (length + (onset - length) * np.exp(-(depth - onset) / length)))
 
 

@@ -178,7 +178,7 @@ def study(name: str, results: Points, along: str) -> Measurement:
     if name != "pulse":
         # The last one is tilted at the rate of the ramp.
         ramp, tilt = (next(one["value"] for one in results[k]["profiles"] if one["name"] == "slide_slopes") for k in (0, -1))
-        ratios = over_chaotic(float(one / other) for one, other in zip(ramp, tilt, strict=False))
+        ratios = over_chaotic(float(one / other) for one, other in zip(ramp, tilt, strict=True))
         return Measurement({"sliding_onset": Value(ratios, exact(1.0))}, [
             profile("onset", "Onset of sliding", "angular acceleration of tilting (rad/s²); 0: ramp", "slope of effective gravity", place,
                     [values], half=halves)])

@@ -295,7 +295,7 @@ def cell(low: Array, high: Array, tilt: Array) -> Array:
 
 
 def before_tilt(low: Array, high: Array, tilt: Array) -> tuple[Array, Array]:
-    """Corners of a box before it is tilted, of those of the box with right angles around it, which dumps hold."""
+    """Corners of the untilted box, from those of the bounding box, which dumps hold."""
     xy, xz, yz = tilt
     least, most = ((*pick, 0.0) for pick in ((min(0.0, xy, xz, xy + xz), min(0.0, yz)), (max(0.0, xy, xz, xy + xz), max(0.0, yz))))
     return low - np.array(least), high - np.array(most)

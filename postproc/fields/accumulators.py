@@ -62,7 +62,7 @@ class FieldSums:
         if (self.contacts is None) != (other.contacts is None):
             different.append("contacts")
         if different:
-            raise DembarkError(f"sums that differ in {', '.join(different)}", "averaging fields over frames", "use the same for all frames")
+            raise DembarkError(f"the sums differ in {', '.join(different)}", "averaging fields over frames", "use the same for all frames")
         contacts = None if self.contacts is None or other.contacts is None else self.contacts + other.contacts
         return replace(self, frames=self.frames + other.frames, grains=self.grains + other.grains, contacts=contacts,
                        boundary=self.boundary + other.boundary)

@@ -57,7 +57,7 @@ class CellTotals:
     def __add__(self, other: CellTotals) -> CellTotals:
         """The sums of both; DembarkError when their grids differ."""
         if not self.grid.same(other.grid):
-            raise DembarkError("sums on different grids", "averaging cells over frames", "use the same grid for all frames")
+            raise DembarkError("the sums are on different grids", "averaging cells over frames", "use the same grid for all frames")
         added = {item.name: getattr(self, item.name) + getattr(other, item.name) for item in fields(self) if item.name != "grid"}
         return CellTotals(self.grid, **added)
 
@@ -124,7 +124,7 @@ def cell_grid(frame: GrainFrame, grains: float = 10.0, through: int | None = Non
     The number density is the median over the grains of that in the cell of each, in cells of four mean diameters.
     """
     if not grains >= 1.0:
-        raise DembarkError(f"cells of {grains} grains", "averaging over cells", "give at least 1; 5 to 20 are usual")
+        raise DembarkError(f"cells of {grains} grains are too small", "averaging over cells", "give at least 1; 5 to 20 are usual")
     if len(frame.radii) == 0:
         raise DembarkError("no grains", f"step {frame.step}", "the size of cells follows from them")
     trial = Grid.around(frame, 8.0 * float(frame.radii.mean()))

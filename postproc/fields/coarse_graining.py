@@ -57,7 +57,7 @@ def coarse_grain(grains: GrainFrame, contacts: ContactFrame | None, grid: Grid, 
     """
     phi = Kernel(kernel, float(width))
     if threads is not None and threads < 1:
-        raise DembarkError(f"{threads} threads", "coarse graining", "give at least 1")
+        raise DembarkError(f"threads = {threads} is too small", "coarse graining", "give at least 1")
     check_periods(grid, grains)
     check_contacts(contacts, grains)
     _check_room(grid, phi, grains, contacts)
@@ -136,7 +136,7 @@ def check_contacts(contacts: ContactFrame | None, grains: GrainFrame) -> None:
     if contacts is None or not len(contacts.branch):
         return
     if contacts.step != grains.step:
-        raise DembarkError(f"contacts of step {contacts.step} and grains of step {grains.step}", "", "give both of the same step")
+        raise DembarkError(f"the contacts are of step {contacts.step}, the grains of step {grains.step}", "", "give both of the same step")
     size = np.asarray(grains.high, float) - grains.low
     # Of the numbers without their axes this is known fast.
     if max(contacts.branch.max(), -contacts.branch.min()) <= 0.5 * size.min():
@@ -198,7 +198,8 @@ def interpolate(field: Array, grid: Grid, places: Array) -> Array:
     NaN of empty cells counts as 0.
     """
     if field.shape[:3] != grid.shape:
-        raise DembarkError(f"a mean velocity on {field.shape[:3]} cells", f"the grid has {grid.shape}", "give it on the grid of the fields")
+        raise DembarkError(f"the mean velocity is on {field.shape[:3]} cells", f"the grid has {grid.shape}",
+                           "give it on the grid of the fields")
     known = np.pad(np.nan_to_num(field), [*((int(flag),) * 2 for flag in grid.periodic), (0, 0)], mode="wrap")
     at = (places - grid.low) / grid.spacing - 0.5
     at = np.where(grid.periodic, at % grid.shape + 1.0, at).T

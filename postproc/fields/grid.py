@@ -36,10 +36,11 @@ class Grid:
         """Refuse (DembarkError) corners that are not finite or not in order, and shapes that are not three positive integers."""
         low, high = np.array(self.low, float), np.array(self.high, float)
         if low.shape != (3,) or high.shape != (3,) or not np.isfinite([low, high]).all() or not (low < high).all():
-            raise DembarkError(f"grid from {self.low} to {self.high} m", "its corners", "give three finite coordinates each, low < high")
+            raise DembarkError(f"no grid can reach from {self.low} to {self.high} m", "its corners",
+                               "give three finite coordinates each, low < high")
         shape = tuple(int(count) for count in self.shape)
         if len(shape) != 3 or min(shape) < 1 or any(count != given for count, given in zip(shape, self.shape, strict=True)):
-            raise DembarkError(f"grid of {self.shape} cells", "its shape", "give three integers of at least 1")
+            raise DembarkError(f"no grid can have {self.shape} cells", "its shape", "give three integers of at least 1")
         low.flags.writeable = high.flags.writeable = False
         for name, value in (("low", low), ("high", high), ("shape", shape), ("periodic", tuple(bool(flag) for flag in self.periodic))):
             object.__setattr__(self, name, value)
@@ -53,7 +54,8 @@ class Grid:
         """
         wanted = np.broadcast_to(np.asarray(spacing, float), 3)
         if not (np.isfinite(wanted).all() and (wanted > 0.0).all() and 0.0 <= margin < np.inf):
-            raise DembarkError(f"cells of {spacing} m, margin of {margin} m", "grid", "give a positive size and a margin of at least 0")
+            raise DembarkError(f"no grid can have cells of {spacing} m and a margin of {margin} m", "grid",
+                               "give a positive size and a margin of at least 0")
         low, high, periodic = extent(frame, margin)
         if not np.isfinite([low, high]).all():
             raise DembarkError("no grains", f"step {frame.step}", "a grid around them needs at least one, or a periodic box")
@@ -111,7 +113,7 @@ def cell_counts(low: Array, high: Array, spacing: float | Array) -> tuple[int, i
     # A share of 1e-9 keeps a length that is an integer multiple of the spacing from getting one cell more by round-off.
     count = np.maximum(1.0, np.ceil((high - low) / spacing * (1.0 - 1e-9)))
     if not (count < _MOST_CELLS).all() or not count.prod() < _MOST_CELLS:
-        raise DembarkError(f"{' × '.join(f'{one:.3g}' for one in count)} cells", "grid", "take larger ones")
+        raise DembarkError(f"{' × '.join(f'{one:.3g}' for one in count)} cells are too many", "grid", "take larger ones")
     return int(count[0]), int(count[1]), int(count[2])
 
 

@@ -41,7 +41,7 @@ class Kernel:
         if self.name not in NAMES:
             raise DembarkError(f"unknown kernel '{self.name}'", "coarse graining", f"choose one of {', '.join(NAMES)}")
         if not (np.isfinite(self.width) and self.width > 0.0):
-            raise DembarkError(f"a kernel of width {self.width} m", "coarse graining", "give a positive width in metres")
+            raise DembarkError(f"a kernel cannot have the width {self.width} m", "coarse graining", "give a positive width in metres")
 
     @property
     def reach(self) -> float:

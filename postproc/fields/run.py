@@ -38,7 +38,7 @@ Show = Callable[[str, int], AbstractContextManager[Callable[[], None]]]
 Loaded = tuple[GrainFrame, ContactFrame | None, list[WallContacts]]
 
 _PATCH = 2.0  # size of a wall's patches in mean diameters
-# Most memory (bytes) that a cell takes: with averages by cell or without, of several frames or of one; and for each time in the results.
+# Most memory (bytes) that a cell of the grid takes, by (averages by cell?, several frames?); and for each time in the results.
 _BYTES = {(True, False): 700.0, (True, True): 800.0, (False, False): 1250.0, (False, True): 1700.0}
 _HELD = 1500.0
 
@@ -177,7 +177,8 @@ class FieldAverages:
             lines.append("note: the dump has no forces of walls (columns f_force_NAME[1..3]); their part of the stress is missing, which "
                          "fades to 0 next to a wall")
         if self.unplaced:
-            lines.append(f"note: where the wall {', '.join(self.unplaced)} is, is not known; its part of the stress is missing, add --wall")
+            lines.append(f"note: the position of the wall {', '.join(self.unplaced)} is unknown; its part of the stress is missing, "
+                         "add --wall")
         lines += [f"note: {one}; add --wall" for one in self.walls.notes]
         inside, there = max(self.masses, key=lambda one: abs(one[0] - one[1]))
         lines.append(f"mass: {inside:.9g} kg in the fields, {there:.9g} kg of grains, difference {abs(inside - there) / (there or 1.0):.1e}"
@@ -231,7 +232,8 @@ def _groups(numbers: list[int], average: str) -> tuple[list[list[int]], int]:
     if average == "all":
         return [numbers], 0
     if not average.isdecimal() or not 1 <= int(average) <= len(numbers):
-        raise DembarkError(f"{average!r} frames", "in --average", f"give 'all' or 1 to {len(numbers)}, the number of the chosen frames")
+        raise DembarkError(f"cannot average {average!r} frames", "in --average",
+                           f"give 'all' or 1 to {len(numbers)}, the number of the chosen frames")
     size = int(average)
     used = len(numbers) // size * size
     return [numbers[start : start + size] for start in range(0, used, size)], len(numbers) - used

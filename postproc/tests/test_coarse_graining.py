@@ -237,7 +237,7 @@ def test_wrong_input_is_refused_in_one_line():
         ("positions with numbers that are not finite", lambda: coarse_grain(broken, None, grid, width=0.1)),
         ("width", lambda: coarse_grain(grains, contacts, grid, width=0.0)),
         ("unknown kernel", lambda: coarse_grain(grains, contacts, grid, kernel="box", width=0.1)),
-        ("0 threads", lambda: coarse_grain(grains, contacts, grid, width=0.1, threads=0)),
+        ("threads = 0", lambda: coarse_grain(grains, contacts, grid, width=0.1, threads=0)),
         ("grain 99, step 7", lambda: coarse_grain(grains, ContactFrame(7, *np.zeros((3, 1, 3)), np.array([[1, 99]])), grid, width=0.1)),
         ("both must agree", lambda: coarse_grain(grains, contacts, Grid((0, 0, 0), (1, 1, 1), (2, 2, 2), (True, False, False)), width=0.1)),
         ("forces with numbers", lambda: coarse_grain(

@@ -75,7 +75,7 @@ class Patches:
 def _rising(edges: Array, what: str) -> Array:
     edges = np.asarray(edges, float)
     if edges.ndim != 1 or len(edges) < 2 or not np.isfinite(edges).all() or not (np.diff(edges) > 0.0).all():
-        raise DembarkError(f"borders of the patches along {what}", "", "they must be at least two rising finite numbers")
+        raise DembarkError(f"the borders of the patches along {what} are wrong", "", "give at least two rising finite numbers")
     return edges
 
 
@@ -126,7 +126,7 @@ def plane_patches(wall: PlaneWall, u: Array, v: Array) -> Patches:
 def cylinder_patches(wall: CylinderWall, around: int, height: Array) -> Patches:
     """`around` sectors of a cylinder by borders `height` along its axis (m, rising)."""
     if around < 1:
-        raise DembarkError(f"wall {wall.name}: {around} patches around", "", "it must be at least one")
+        raise DembarkError(f"wall {wall.name} cannot have {around} patches around", "", "give at least one")
     sign = -1.0 if wall.inward else 1.0
     return _rectangular((borders(0.0, _TURN, around), height), lambda a, b: wall.radius * np.outer(np.diff(a), np.diff(b)),
                         wall.points, lambda a, _: sign * wall.outward(a), ("angle", "height"), ("rad", "m"), (_FACET, np.inf))
@@ -145,7 +145,7 @@ def mesh_patches(wall: MeshWall, by: str = "triangle") -> Patches:
         kinds, number = np.unique(groups, return_inverse=True)
         labels = tuple(wall.group_names[kind] if 0 <= kind < len(wall.group_names) else f"group {kind}" for kind in kinds)
     else:
-        raise DembarkError(f"wall {wall.name}: patches by {by!r}", "", "those of a mesh are by 'triangle' or 'group'")
+        raise DembarkError(f"wall {wall.name} has no patches by {by!r}", "", "those of a mesh are by 'triangle' or 'group'")
     total = np.bincount(number, area).astype(float, copy=False)
     centres, normals = (np.column_stack([np.bincount(number, area * column) for column in values.T]) / total[:, None]
                         for values in (corner.mean(axis=1), wall.axes[:, 0]))
@@ -174,7 +174,7 @@ def inclusion_patches(inclusion: Inclusion, radius: float, around: int, along: i
 def box_patches(wall: Wall | Inclusion, frame: GrainFrame, size: float) -> Patches:
     """Patches of about `size` (m) on all of the wall that lies in the box of `frame`; those of a mesh are its triangles."""
     if not 0.0 < size < np.inf:
-        raise DembarkError(f"wall {wall.name}: patches of {size} m", "", "their size must be positive and finite")
+        raise DembarkError(f"wall {wall.name} cannot have patches of {size} m", "", "their size must be positive and finite")
     if isinstance(wall, MeshWall):
         return mesh_patches(wall)
     if isinstance(wall, Inclusion):

@@ -104,7 +104,8 @@ class CaseReader(TableReader):
         """What the decks write."""
         found = tuple(self.pick(name, OUTPUTS, "output", "case") for name in head.get("outputs", STANDARD_OUTPUTS))
         if not found or len(set(found)) < len(found):
-            raise self.fail("case", f"outputs = {list(found)}", f"one or more of {', '.join(OUTPUTS)}, each once")
+            raise self.fail("case", f"outputs = {list(found)} is empty or repeats one",
+                            f"give one or more of {', '.join(OUTPUTS)}, each once")
         return found
 
     def rates(self, given: Mapping[str, Any]) -> dict[str, float]:
@@ -112,7 +113,8 @@ class CaseReader(TableReader):
         for engine, rate in given.items():
             self.pick(engine, engines.names(), "engine", "case")
             if isinstance(rate, bool) or not isinstance(rate, int | float) or not rate > 0:
-                raise self.fail("case", f"rates: {engine} = {rate!r}", "particle-steps per second and core, a number > 0", "rates")
+                raise self.fail("case", f"rates: {engine} = {rate!r} is no rate",
+                                "give particle-steps per second and core, a number > 0", "rates")
         return dict(given)
 
     def merged(self, table: str, data: Mapping[str, Any], groups: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -236,9 +238,9 @@ class CaseReader(TableReader):
             raise self.fail(table, "a tolerance without evidence", f"say what the reference is: {', '.join(EVIDENCE)}")
         if isinstance(found.tolerance, str):
             if found.tolerance != "bound":
-                raise self.fail(table, f"tolerance = {found.tolerance!r}", 'a number >= 0, or "bound"')
+                raise self.fail(table, f"tolerance = {found.tolerance!r} is unknown", 'give a number >= 0, or "bound"')
         elif found.tolerance is not None and not found.tolerance >= 0:
-            raise self.fail(table, f"tolerance = {found.tolerance!r}", 'a number >= 0, or "bound"')
+            raise self.fail(table, f"tolerance = {found.tolerance!r} is negative", 'give a number >= 0, or "bound"')
         elif found.tolerance and not found.why:
             raise self.fail(table, "a tolerance without why", "say where the deviation that it allows comes from")
         return found
@@ -257,7 +259,7 @@ class CaseReader(TableReader):
         found: dict[str, tuple[str, ...]] = {}
         for wrong, names in (entry for table in tables for entry in table.get("controls", {}).items()):
             if not isinstance(names, list) or not names:
-                raise self.fail("controls", f"{wrong!r} = {names!r}", "a list of the quantities whose checks it fails")
+                raise self.fail("controls", f"{wrong!r} = {names!r} is no list", "give a list of the quantities whose checks it fails")
             found[wrong] = (*found.get(wrong, ()), *(self.pick(str(name), quantities, "quantity", "controls") for name in names))
         return found
 

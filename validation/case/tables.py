@@ -131,7 +131,7 @@ class TableReader:
         """DembarkError unless the lists `keys` of `data` hold texts only."""
         for key in keys:
             if any(not isinstance(one, str) for one in data.get(key, ())):
-                raise self.fail(table, f"{key} = {data[key]}", "a list of texts", key)
+                raise self.fail(table, f"{key} = {data[key]} does not hold texts only", "give a list of texts", key)
 
     def record(self, kind: type[Record], data: Any, table: str, **given: Any) -> Record:
         """The dataclass `kind` from the table `data`: keys are the fields that are not `given`, their types those of the fields, and a key

@@ -31,7 +31,7 @@ def read(reader: TableReader, data: Mapping[str, Any]) -> dict[str, dict[str, An
         reader.table(entry, table, _KINDS[kind], ("radius",) if kind == "cylinder" else ())
         for key, value in entry.items():
             if isinstance(value, list) and (len(value) != 3 or not all(isinstance(one, int | float | str) for one in value)):
-                raise reader.fail(table, f"{key} = {value}", "three numbers or expressions", key)
+                raise reader.fail(table, f"{key} = {value} is no vector", "give three numbers or expressions", key)
             for text in value if isinstance(value, list) else [value]:
                 if isinstance(text, str) and key not in ("kind", "motion"):
                     try:

@@ -28,8 +28,8 @@ SWITCHES = ("DEMBARK_LANES",)
 CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid carried by grains", "rolling_resistance": "couples against rolling",
                 "own_inertia": "moments of inertia other than a sphere's",
                 "creeping_friction": "friction of boxes without a spring"}
-DECK_NOTE = ("Written by dembark; SI units. Do not edit a number without a comment alone: it follows from the others, as packing and "
-             "meshes do. To change a parameter, write the deck anew with 'dembark deck'.")
+DECK_NOTE = ("Written by dembark; SI units. Numbers with a comment are parameters. Numbers without one, the packing and the meshes are "
+             "computed from them: do not change these by hand. To change a parameter, write the deck anew with 'dembark deck'.")
 
 
 @dataclass(frozen=True)
@@ -58,17 +58,18 @@ class EngineFacts:
     measured_on: str = ""
     capabilities: tuple[str, ...] = ()
     optional: bool = False
-    # Environment variables that say which program is meant, its name, where it is built below `build` and by what command, and whether one
-    # that is found on PATH will do.
+    # Environment variables that say which program is meant.
     variables: tuple[str, ...] = ()
+    # Its name, and whether one that is found on PATH will do.
     executable: str = ""
+    on_path: bool = False
+    # Where it is built below `build`, and by what target of make.
     built: str = ""
     target: str = ""
     # The extra of the Python package that brings it where there is no checkout.
     extra: str = ""
     # What brings parts that the program found may lack.
     own_build: str = ""
-    on_path: bool = False
     # What makes the ids in its impact files count from 1.
     impact_id_offset: int = 0
     # What stands in a deck, or in what it includes, when it writes states to resume from.

@@ -6,10 +6,10 @@ Two one-sided tests (TOST, D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (198
 are noisy enough never do.
 
 Packings differ by more than what varies within one, so random runs are compared only by intervals over three packings or more in each
-engine; with fewer the difference is shown, and nothing is due to be checked. Engines that solve the same equations are due to differ by
-chance alone: a difference beyond chance fails, though it may be within 10 %. A page compares many quantities, of which one in twenty lies
-beyond its 95 % interval although nothing is wrong, so what counts as beyond chance is what is outside of the interval that holds all
-differences of the page together with 99 %.
+engine; with fewer the difference is shown, and nothing is checked. Engines that solve the same equations should differ by chance alone: a
+difference beyond chance fails, though it may be within 10 %. A page compares many quantities, of which one in twenty lies beyond its 95 %
+interval although nothing is wrong, so what counts as beyond chance is what is outside of the interval that holds all differences of the
+page together with 99 %.
 
 All engines start from the same packings. In a case whose packing decides what comes out (`paired`), the difference is the mean of the
 differences in each packing, with their own interval: what a packing does to all engines alike is no part of it. Where motion is chaotic,
@@ -78,7 +78,7 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
 
     pass: the joint 95 % interval of the difference is within 10 %. fail: the difference is beyond what chance does to one of all
     `comparisons`. info: the joint interval reaches beyond 10 %, is unknown, or comes from fewer than three packings in either engine, which
-    cannot hold what varies from one packing to the next. Where fewer than three were planned, nothing is due to be checked.
+    cannot hold what varies from one packing to the next. Where fewer than three were planned, nothing is checked.
 
     A quantity of a deterministic run has an `agreement` instead, in its own unit: pass within it, fail beyond it.
     """
@@ -119,7 +119,8 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
 
 def _chance(value: QuantityRecord, reference: QuantityRecord, confidence: float) -> Callable[[int], tuple[float, float, float]]:
     """For any number of packings in each engine, all over the reference: the half-width of the 95 % interval of the difference, that with
-    `confidence`, and the size from which a difference beyond that fails. 0: the packings that there are; others of the same scatter."""
+    `confidence`, and the size from which a difference beyond that fails. 0: with
+    the packings that were run; else with that many packings of the same scatter."""
     scale, both = abs(reference.value or 0.0), (value, reference)
     differences = np.subtract(value.samples, reference.samples) if len(value.samples) == len(reference.samples) else np.zeros(0)
 

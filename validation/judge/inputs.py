@@ -86,5 +86,5 @@ def stored_hash(path: Path) -> str:
 
 
 def stamp(text: str, inputs_hash: str) -> str:
-    """The report `text` with its hash, see `stored`."""
+    """The report `text` with its hash, see `stored_hash`."""
     return f"{text.rstrip()}\n<!-- {KEY} {inputs_hash} -->\n"

@@ -67,7 +67,7 @@ class Tally(Counts):
     def sentences(self) -> list[str]:
         """A line for each kind of evidence, `theory (laws and exact solutions): 3 of 4 checks passed, 1 FAILED`, and each unread result."""
         lines = [f"{kind or 'evidence'} ({MEANING[kind]}): {counts.sentence}" for kind, counts in self.by_evidence.items()]
-        united = f"families: the {self.checks} checks unite {self.members} judged values, those of one fact as one"
+        united = f"families: {self.members} judged values make {self.checks} checks: values that measure the same thing count once"
         return [*lines, *([united] if self.members > self.checks else []), *([self.multiplicity] if self.random else []),
                 *(f"not counted: {line}" for line in self.unread)]
 
@@ -75,7 +75,7 @@ class Tally(Counts):
     def multiplicity(self) -> str:
         """How many checks rest on intervals, and how many of these would fail by chance."""
         return (f"chance: {self.random} of the checks rest{'s' if self.random == 1 else ''} on intervals; if every model held exactly, "
-                f"at most {self.by_chance:.1g} of them would fail")
+                f"at most {self.by_chance:.1g} failures would be expected")
 
 
 # How a family stands: as the first of these does that occurs among its members.

@@ -1,1 +1,1 @@
-"""Runs: what there is to run, what has run (one table), and one executor that runs it, here or on a cluster."""
+"""Runs: simulation of one run, the executor, here or on a cluster, and the steps after the runs."""

@@ -39,7 +39,7 @@ def describe(state: State) -> str:  # noqa: PLR0911 - one return for each state
         case "finished":
             return f"{state.name}: finished in {took}{f' in attempt {state.attempt}' if state.attempt > 1 else ''}"
         case "stopped":
-            return f"{state.name}: stopped after {took}: {state.message}"
+            return f"{state.name}: stopped{f' after {took}' if state.ended else ''}: {state.message}"
         case "failed":
             return f"{state.name}: FAILED after {took}: {state.message}"
     return f"{state.name}: {state.state}"

@@ -37,7 +37,7 @@ def test_a_case_names_what_it_writes(decks: Path) -> None:
     ("words", "message"),
     [
         ('["times", "impact"]', "did you mean impacts"),
-        ("[]", "one or more of"),
+        ("[]", "give one or more of"),
         ('["times", "times"]', "each once"),
         ('"times"', "wrong type"),
     ],

@@ -62,14 +62,14 @@ class Item:
 
 def check(name: str, label: str, value: float, due: float, tolerance: float, *, evidence: str, source: str, control: str,
           absolute: bool = True, **more: Any) -> QuantityRecord:
-    """A `value` that is due to be `due` within `tolerance`; `control`: what fails it. `more`: other fields of Declared."""
+    """A `value` that must be `due` within `tolerance`; `control`: what fails it. `more`: other fields of Declared."""
     declared = Declared(name, label, evidence=evidence, tolerance=tolerance, absolute=absolute, source=source, compared=False,
                         control=control, **more)
     return judged(declared, Value(Estimate(float(value), 0.0), Estimate(float(due), 0.0)))
 
 
 def exact(name: str, label: str, error: float, source: str, control: str, *, tolerance: float = ROUND_OFF, **more: Any) -> QuantityRecord:
-    """An error that is due to be zero to `tolerance`, see `check`."""
+    """An error that must be zero to `tolerance`, see `check`."""
     return check(name, label, error, 0.0, tolerance, evidence="identity", source=source, control=control, **more)
 
 

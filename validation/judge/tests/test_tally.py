@@ -44,8 +44,8 @@ def test_a_family_counts_once_and_stands_as_its_worst_member() -> None:
     assert tally((one, undecided, one, other)).sentence == "1 of 2 checks passed, none failed, 1 open"
     found = tally((one, undecided, failed, other))
     assert (found.passed, found.failed, found.open, found.members, found.random) == (1, 1, 0, 4, 1)
-    assert found.by_chance == pytest.approx(0.09) and found.sentences[1] == ("families: the 2 checks unite 4 judged values, "
-                                                                             "those of one fact as one")
+    assert found.by_chance == pytest.approx(0.09) and found.sentences[1] == ("families: 4 judged values make 2 checks: "
+                                                                             "values that measure the same thing count once")
     # Neither a shown value nor a pass that nothing is known to fail makes a family pass or fail.
     assert tally((replace(one, verdict="info", tolerance=None), one)).passed == 1
     assert tally((replace(one, control=""), failed)).failed == 1
@@ -70,7 +70,7 @@ def test_checks_that_rest_on_intervals_are_counted_with_what_chance_does_to_them
     counted = tally([*found, QuantityRecord("d", 1.0, "info", chance=0.5)])
     assert counted.random == 3 and counted.by_chance == pytest.approx(0.0759, rel=0.01)
     assert counted.sentences[-1] == ("chance: 3 of the checks rest on intervals; "
-                                     "if every model held exactly, at most 0.08 of them would fail")
+                                     "if every model held exactly, at most 0.08 failures would be expected")
     assert not any("chance" in line for line in tally(QUANTITIES).sentences)
 
 
