@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.units import finite, to_si
 
@@ -100,12 +100,6 @@ def contact_columns(text: str) -> dict[str, list[int | str]]:
     return found
 
 
-def near(word: str, known: Iterable[str]) -> str:
-    """A guess of what was meant, or ''."""
-    close = difflib.get_close_matches(word, list(known), 1)
-    return f"; did you mean {close[0]}?" if close else ""
-
-
 @dataclass(frozen=True)
 class PatchedWall:
     """A wall, how its patches of about a given size (m) are made for a frame, and the unit (m) that the file of a mesh was read in."""
@@ -127,13 +121,10 @@ def parse_wall(text: str, diameter: float) -> PatchedWall:
     if not re.fullmatch(r"\w+", name) or not rest:
         raise DembarkError(f"{text!r} is not a wall", "in --wall", "write name:kind:key=value, such as side:cylinder:radius=25mm")
     kind, options = rest[0], {}
-    if kind not in _KINDS:
-        raise DembarkError(f"{kind!r} is not a kind of wall", f"in {where}", f"it must be {', '.join(_KINDS)}{near(kind, _KINDS)}")
+    pick(kind, _KINDS, "kind of wall", f"in {where}")
     for part in rest[1:]:
         key, sign, value = part.partition("=")
-        if key not in _KINDS[kind]:
-            known = _KINDS[kind]
-            raise DembarkError(f"{key!r} is not a key of a {kind}", f"in {where}", f"there are {', '.join(known)}{near(key, known)}")
+        pick(key, _KINDS[kind], f"key of a {kind}", f"in {where}")
         if not sign and key != "outside":
             raise DembarkError(f"{key!r} has no value", f"in {where}", f"write {key}=value")
         options[key] = value

@@ -17,10 +17,14 @@ from .statistics import Estimate, combined
 Array = NDArray[np.float64]
 
 
+def quantity(point: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """The quantity `name` of the result `point`, the content of a metrics.json."""
+    return next(one for one in point["quantities"] if one["name"] == name)
+
+
 def measured(point: Mapping[str, Any], name: str, factor: float = 1.0) -> Estimate:
-    """The quantity `name` of the result `point` (the content of a metrics.json), times `factor`; half-width inf where it has no
-    interval."""
-    one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
+    """The quantity `name` of the result `point`, times `factor`; half-width inf where it has no interval."""
+    one = quantity(point, name)
     half = 0.5 * (one["interval"][1] - one["interval"][0]) if one["interval"] else math.inf
     return Estimate(one["value"] * factor, half * factor, one.get("basis", ""))
 

@@ -58,7 +58,7 @@ def _packages(extra: str, names: tuple[str, ...]) -> Finding:
 def _parts(facts: engines.EngineFacts) -> list[Finding]:
     """What the engine lacks that its users may know from other builds; nothing where it is not installed."""
     try:
-        lacking = "" if engines.engine_class(facts.name).pending() else ", ".join(engines.find(facts.name).lacking())
+        lacking = "" if engines.engine_class(facts.name).pending() else ", ".join(engines.find(facts.name).missing_parts())
     except DembarkError:
         return []
     advice = f"built without {lacking}; no case needs them; {facts.own_build}"

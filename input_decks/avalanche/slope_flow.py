@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from dembark.input_decks.common.heaps import EDGE
+from dembark.input_decks.common.heaps import EDGE, behind
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array, Estimate
 from dembark.postproc.resampling import resampled
@@ -54,10 +54,7 @@ class Slope:
 
     def reach(self, frame: GrainFrame, share: float = 0.95) -> float:
         """s (m) of the grain behind which this share of the mass lies; a few that roll on to the end of the flat do not count."""
-        s = self.along(frame.positions)
-        order = np.argsort(s)
-        behind = np.cumsum(frame.masses[order]) / frame.masses.sum()
-        return float(s[order][np.searchsorted(behind, share)])
+        return behind(self.along(frame.positions), frame.masses, share)
 
     def thickness(self, frame: GrainFrame, edges: Array) -> Array:
         """m, solid volume over area in the cells of s between `edges` (m)."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from dembark.input_decks.common import momentum
 from dembark.input_decks.common.estimates import over_chaotic
-from dembark.input_decks.common.heaps import height, surface
+from dembark.input_decks.common.heaps import behind, height, surface
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc import DumpError, GrainFrame
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, profile
@@ -64,9 +64,7 @@ class Collapse:
 
     def front(self) -> float:
         """m, behind which a share FRONT of the mass lies at the end."""
-        order = np.argsort(self.last.positions[:, 0])
-        behind = np.cumsum(self.last.masses[order]) / self.last.masses.sum()
-        return float(self.last.positions[order[np.searchsorted(behind, FRONT)], 0])
+        return behind(self.last.positions[:, 0], self.last.masses, FRONT)
 
     def centre(self) -> Array:
         """Centre of mass (3,) of the deposit in m."""

@@ -49,6 +49,13 @@ def front(frame: GrainFrame, depth: float, diameter: float) -> float:
     return float(places[np.argmin(covered)])
 
 
+def behind(places: Array, masses: Array, share: float) -> float:
+    """The one of `places` (n,) in m of grains behind which, up to and with itself, `share` of their `masses` (n,) lies."""
+    order = np.argsort(places)
+    part = np.cumsum(masses[order]) / masses.sum()
+    return float(places[order[np.searchsorted(part, share)]])
+
+
 def column_height(first: GrainFrame, last: GrainFrame, reach: float) -> float:
     """m, height of the deposit `last` next to the wall x = 0: that of the column `first`, twice that of its centre of mass, times the ratio
     of the volumes within `reach` (m) of the wall, in which what the wall does to the packing cancels."""

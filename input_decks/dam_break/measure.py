@@ -14,7 +14,7 @@ from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Numbers, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.statistics import student
-from dembark.postproc.studies import compared, measured, numerical
+from dembark.postproc.studies import compared, measured, numerical, quantity
 
 from .water import common_values
 
@@ -98,7 +98,7 @@ def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001
 
 def _known(point: Numbers, name: str) -> Estimate:
     """The quantity of a run; no number where its front did not get there."""
-    one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
+    one = quantity(point, name)
     return NOWHERE if one["value"] is None else measured(point, name)
 
 

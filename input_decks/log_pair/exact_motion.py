@@ -8,6 +8,7 @@ from dembark.input_decks.common.log_run import LogRun, energy_curves, over_time
 from dembark.physics.exact.chains import Chain, ChainMotion
 from dembark.physics.exact.pairs import Pair, PairMotion
 from dembark.postproc.measurement import Array, Curve, Numbers, Value, number
+from dembark.postproc.studies import quantity
 
 # Curves are drawn of so many logs at most.
 SHOWN = 5
@@ -62,5 +63,5 @@ def row_curves(run: LogRun, chain: Chain, motion: ChainMotion) -> list[Curve]:
 
 def error(point: Numbers, name: str) -> float:
     """Relative error of the quantity `name` of a result, or its absolute value where the reference is 0."""
-    one = next(quantity for quantity in point["quantities"] if quantity["name"] == name)
+    one = quantity(point, name)
     return abs(one["value"] / one["reference"] - 1.0) if one["reference"] else abs(one["value"])

@@ -102,7 +102,7 @@ def test_a_cylinder_turns_with_its_own_moment_of_inertia(simulate: Any) -> None:
     spins = [np.array([frame.omegas[-1, 1] for frame in run.grains()]) for run in (cylinder, sphere)]
     assert np.abs(spins[0] - spins[1]).max() > 0.01 * np.abs(spins[1]).max()
     for engine in ("liggghts", "lammps"):
-        assert find("vibro_finishing").lacks(engine, cylinder.parameters) == ["moments of inertia other than a sphere's"]
+        assert find("vibro_finishing").missing_capabilities(engine, cylinder.parameters) == ["moments of inertia other than a sphere's"]
 
 
 RECORDED = {"grain_count": 60, "part_diameter": 0.02, "motion_ramp": 1, "settle_time": 0.1}

@@ -14,10 +14,11 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.memory import check_memory
 
-from ..cli_options import counts, length, near, span
+from ..cli_options import counts, length, span
 from ..contacts import ContactFrame
 from ..grains import GrainFrame
 from ..output.netcdf import dataset, joined
@@ -26,7 +27,7 @@ from ..walls import Inclusion, wall_contacts
 from ..walls.run import WallLoads, wall_lines
 from ..walls.stress import WallStress
 from .accumulators import MASS, MOMENTUM
-from .cells import FIELDS, cell_grid, cell_totals
+from .cells import FIELDS, LEAST_CONTACTS, cell_grid, cell_totals
 from .coarse_graining import WallContacts, coarse_grain
 from .field_set import FieldSet
 from .grid import Grid, cell_counts, extent
@@ -67,7 +68,8 @@ class FieldAverages:
 
     def __init__(self, chosen: Selection, *, kernel: str = "gaussian", width: str = "1.5d", grid: str | None = None,
                  spacing: str | None = None, box: str | None = None, average: str = "all", walls: Iterable[str] = (), cells: bool = False,
-                 least_contacts: int = 3000, only: str | None = None, threads: int | None = None, show: Show | None = None) -> None:
+                 least_contacts: int = LEAST_CONTACTS, only: str | None = None, threads: int | None = None,
+                 show: Show | None = None) -> None:
         if grid is not None and spacing is not None:
             raise DembarkError("--grid and --spacing are both given", "", "give one of them")
         self.chosen, self.cells, self.least_contacts, self.threads = chosen, cells, least_contacts, threads
@@ -220,11 +222,7 @@ class FieldAverages:
 
 def _names(text: str | None, known: Collection[str]) -> list[str]:
     """Names of fields, separated by commas; DembarkError for one that does not exist."""
-    names = [name.strip() for name in text.split(",")] if text else []
-    for name in names:
-        if name not in known:
-            raise DembarkError(f"{name!r} is not a field", "in --fields", f"there are {', '.join(known)}{near(name, known)}")
-    return names
+    return [pick(name.strip(), known, "field", "in --fields") for name in text.split(",")] if text else []
 
 
 def _groups(numbers: list[int], average: str) -> tuple[list[list[int]], int]:

@@ -201,7 +201,7 @@ class _Reader(TableReader):
         chosen = (self.names(table, entry, "engines", case.engines, "engine")
                   or tuple(name for name in case.engines if (name in head["engines"] if "engines" in head else
                                                              not engines.facts(name).optional
-                                                             and not any(case.lacks(name, values) for values in needed))))
+                                                             and not any(case.missing_capabilities(name, values) for values in needed))))
         if not chosen:
             raise self.fail(table, f"case {case.name} runs in none of the campaign's engines", f"it runs in {', '.join(case.engines)}")
         return SweepSpec(

@@ -155,8 +155,8 @@ def require_capable(case: Case, engine: str, values: Mapping[str, Value]) -> Non
     if engine not in case.engines or not case.deck(engine).is_file():
         raise DembarkError(f"case {case.name} has no {engines.facts(engine).deck}", f"in {case.folder}",
                            f"it has decks for {' and '.join(case.engines)}")
-    if lacking := case.lacks(engine, values):
-        others = [name for name in case.engines if not case.lacks(name, values)]
+    if lacking := case.missing_capabilities(engine, values):
+        others = [name for name in case.engines if not case.missing_capabilities(name, values)]
         raise DembarkError(f"{engines.facts(engine).title} has no {' and no '.join(lacking)}",
                            f"which these parameters of case {case.name} need", f"take {' or '.join(others)}" if others else "")
 

@@ -208,10 +208,11 @@ class Case:
         return {key: Expression(value)(values) if isinstance(value, str) and key not in words else value
                 for key, value in self.picture.items()} or None
 
-    def lacks(self, engine: str, values: Mapping[str, Value]) -> list[str]:
+    def missing_capabilities(self, engine: str, values: Mapping[str, Value]) -> list[str]:
         """What a run with the parameters `values` needs and `engine` lacks, in words."""
         where = f"[needs] of case {self.name}"
-        return engines.facts(engine).lacks(name for name, condition in self.needs.items() if condition.evaluated(values, where=where))
+        return engines.facts(engine).missing_capabilities(
+            name for name, condition in self.needs.items() if condition.evaluated(values, where=where))
 
     def deck(self, engine: str) -> Path:
         """Deck of `engine` in this folder."""

@@ -201,7 +201,7 @@ class CaseReader(TableReader):
         found = []
         for variant in (self.pick(name, case.variants, "variant", "runs") for name in named):
             values = {name: one.value for name, one in case.parameters.items()} | {**case.profiles[profile], **case.variants[variant]}
-            lacks = {engine: lacking for engine in chosen if (lacking := case.lacks(engine, values))}
+            lacks = {engine: lacking for engine in chosen if (lacking := case.missing_capabilities(engine, values))}
             if "engines" in entry and lacks:
                 engine, lacking = next(iter(lacks.items()))
                 raise self.fail("runs", f"{variant} in {engine}, which has no {' and no '.join(lacking)}", "take it from engines")

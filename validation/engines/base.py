@@ -99,7 +99,7 @@ class EngineFacts:
         if ranks > 1 and not self.ranks:
             raise DembarkError(f"--ranks {ranks} with {self.title}", "", f"use --threads: {self.one_process}")
 
-    def lacks(self, needed: Iterable[str]) -> list[str]:
+    def missing_capabilities(self, needed: Iterable[str]) -> list[str]:
         """What of `needed`, names of CAPABILITIES, it has not, in words."""
         return [CAPABILITIES[name] for name in needed if name not in self.capabilities]
 
@@ -189,7 +189,7 @@ class Engine(ABC):
         """Environment variables by which a user changes how it computes, those that are set."""
         return {name: os.environ[name] for name in SWITCHES if name in os.environ}
 
-    def lacking(self) -> Iterable[str]:
+    def missing_parts(self) -> Iterable[str]:
         """Parts that other builds of the program have, and what needs them: for users' own scripts, no case needs them."""
         return ()
 

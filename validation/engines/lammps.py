@@ -37,7 +37,7 @@ class Lammps(InputScript):
         except DembarkError:
             package = cls._package()
             if package and not package.launcher.is_file():
-                if missing := package.lacking():
+                if missing := package.missing_tools():
                     raise DembarkError(f"LAMMPS {package.version} in {package.folder}", "its plugin cannot be built", missing) from None
                 return f"LAMMPS {package.version} in {package.folder}; the first run builds its plugin"
         return ""

@@ -54,7 +54,7 @@ class Package:
         """The program once it is built."""
         return self.store / "bin" / "lammps-dembark"
 
-    def lacking(self) -> str:
+    def missing_tools(self) -> str:
         """What a build needs and this machine has not, with what to do; empty when nothing is missing."""
         if not (compiler := os.environ.get("CXX") or shutil.which("c++") or shutil.which("g++") or shutil.which("clang++")):
             return "no C++ compiler: install g++ 9 or clang 10, or newer ones, or set CXX to one"
@@ -70,7 +70,7 @@ class Package:
         """The launcher, after the plugin was built unless it was there; DembarkError when it cannot be built."""
         if self.launcher.is_file():
             return self.launcher
-        if missing := self.lacking():
+        if missing := self.missing_tools():
             raise DembarkError("LAMMPS is installed, but its plugin cannot be built", "", missing)
         store = self.store
         try:

@@ -52,7 +52,7 @@ class Yade(Engine):
         return [self.executable, *(path for suffix in ("*.so", "*.py") for path in (self.prefix / "lib").rglob(suffix)
                                    if path.is_file() and (not path.is_symlink() or "dembark" in path.name or path.match("lib*.so")))]
 
-    def lacking(self) -> Iterable[str]:
+    def missing_parts(self) -> Iterable[str]:
         """See Engine; its start script names the features."""
         script = self.executable.read_text(encoding="utf-8", errors="replace")
         named = re.search(r"(?m)^features,version,debugbuild='([^']*)'", script)

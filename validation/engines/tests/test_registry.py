@@ -97,7 +97,8 @@ def test_a_registered_engine_fulfils_the_protocol(engine: type[Engine], tmp_path
     assert words[0] == str(program) and facts.deck in words and not any("unset" in word for word in words)
     assert any("0.1" in word for word in words) and found.environment(2)["OMP_NUM_THREADS"] == "2"
     assert set(facts.capabilities) <= set(engines.CAPABILITIES)
-    assert facts.lacks(engines.CAPABILITIES) == [what for name, what in engines.CAPABILITIES.items() if name not in facts.capabilities]
+    assert facts.missing_capabilities(engines.CAPABILITIES) == [
+        what for name, what in engines.CAPABILITIES.items() if name not in facts.capabilities]
     monkeypatch.delenv(facts.launcher, raising=False)
     if facts.ranks:
         assert found.command(Path(facts.deck), {}, ranks=2)[2] == "2"
