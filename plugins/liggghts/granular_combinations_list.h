@@ -1,5 +1,5 @@
 // Combinations of contact models that are compiled: each line stands for every choice of one model from each bracket. The one list for
-// liggghts-dembark, for the line that refuses all others, and for packaging/install_liggghts.sh.
+// liggghts-dembark, and for the line that refuses all others.
 GRAN_MODELS((HERTZ, HOOKE), TANGENTIAL_FINNIE_RABINOWICZ, COHESION_OFF, (ROLLING_OFF, ROLLING_CDT, ROLLING_EPSD2), SURFACE_DEFAULT)
 GRAN_MODELS((HERTZ, HOOKE), TANGENTIAL_FINNIE_RABINOWICZ, COHESION_CAPILLARY, (ROLLING_OFF, ROLLING_CDT, ROLLING_EPSD2), SURFACE_DEFAULT)
 GRAN_MODELS((HERTZ, HOOKE), TANGENTIAL_FINNIE_RABINOWICZ, COHESION_ADHESION, (ROLLING_OFF), SURFACE_DEFAULT)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -113,3 +115,14 @@ def test_export(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str
         assert main(["export", *words]) == 2
         error = capsys.readouterr().err
         assert expected in error and error.count("\n") == 1
+
+
+@pytest.mark.skipif(not os.access("/", os.W_OK), reason="needs a folder below the root")
+def test_runs_of_a_folder_directly_below_the_root() -> None:
+    """As in containers: `/out` with `/out/replica-1`."""
+    with tempfile.TemporaryDirectory(prefix="dembark-", dir="/") as folder:
+        place = Path(folder, "replica-1")
+        place.mkdir()
+        (place / "run.json").write_text('{"inputs": "a", "steps": 10}')
+        found = tables.runs(folder)
+    assert found.loc[0, ["folder", "case", "replica"]].tolist() == ["replica-1", "", 1]
