@@ -7,14 +7,14 @@
 #
 # In this order: a group's own YADE, named by YADE_PREFIX (what `cmake --install` filled) and YADE_SOURCE_DIR (the matching source tree,
 # for its headers); the package of the distribution (Debian 13), with headers from its source package; a build of the same source with
-# the system's Python (Debian 12). The source comes through apt from Debian's trixie suite, with lists and state of its own so that the
-# machine's apt stays as it was.
+# Python (Debian 12, and other systems). The source is YADE_ARCHIVE, an archive of it; otherwise it comes through apt from Debian's trixie
+# suite, with lists and state of its own so that the machine's apt stays as it was.
 set -euo pipefail
 
 here=$(cd "$(dirname "$0")" && pwd)
 version=2025.2.0
 sha256=42702372251bf5e8f07a364bdf30533a1318947e4db90435b1f89293dc029156
-python=/usr/bin/python3
+python=${SYSTEM_PYTHON:-/usr/bin/python3}
 # Whatever is changed here, in targets.cmake or in engine_classes.cmake makes a new build.
 flags=(-DDISABLE_ALL=ON -DENABLE_OPENMP=ON -DENABLE_LOGGER=ON -DENABLE_USEFUL_ERRORS=OFF -DENABLE_MULTI_REAL_HP=OFF
        -DNOSUFFIX=ON -DDISABLE_SAVE_TEMPS=ON
@@ -61,13 +61,32 @@ if ! flock -n 9; then
   [ -e "$store/.complete" ] && answer "$prefix" "$source"
 fi
 
+unpack() {  # unpack ARCHIVE
+  rm -rf "$source.part" "$source"
+  mkdir -p "$source.part"
+  # By Python: one package less.
+  $python -c 'import sys, tarfile
+with tarfile.open(sys.argv[1]) as archive:
+    archive.extractall(sys.argv[2], **({"filter": "data"} if hasattr(tarfile, "data_filter") else {}))' "$1" "$source.part" ||
+    die "$1 cannot be unpacked; give the archive of YADE $version"
+  mv "$source.part/"*/ "$source"
+  rm -rf "$source.part"
+}
+
+given() {
+  [ -r "$YADE_ARCHIVE" ] || die "YADE_ARCHIVE=$YADE_ARCHIVE cannot be read; give the archive of YADE $version"
+  unpack "$YADE_ARCHIVE"
+  [ -e "$source/core/Scene.hpp" ] && grep -qs "$version" "$source/RELEASE" || {
+    rm -rf "$source"; die "YADE_ARCHIVE=$YADE_ARCHIVE is not the source of YADE $version (its file RELEASE says otherwise)"; }
+}
+
 fetch() {
   local apt=$store/apt uri
   mkdir -p "$apt"/{lists/partial,cache/archives/partial,download}
   : >"$apt/status"
   uri=$(apt-get indextargets --format '$(CODENAME) $(COMPONENT) $(REPO_URI)' 'Created-By: Packages' 2>/dev/null |
         awk '$2 == "main" && $1 !~ /security/ && $1 !~ /updates/ { print $3; exit }')
-  [ -n "$uri" ] || die "apt lists no Debian mirror from which the source of YADE could come; run 'apt-get update' on Debian, or set YADE_PREFIX and YADE_SOURCE_DIR"
+  [ -n "$uri" ] || die "apt lists no Debian mirror from which the source of YADE could come; run 'apt-get update' on Debian, or set YADE_ARCHIVE, or YADE_PREFIX and YADE_SOURCE_DIR"
   echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] $uri trixie main" >"$apt/trixie.list"
   local opts=(-o "Dir::Etc::sourcelist=$apt/trixie.list" -o Dir::Etc::sourceparts=/dev/null -o "Dir::State=$apt"
               -o "Dir::State::lists=$apt/lists" -o "Dir::State::status=$apt/status" -o "Dir::Cache=$apt/cache" -o APT::Sandbox::User=)
@@ -77,19 +96,13 @@ fetch() {
   local tarball=$apt/download/yade_$version.orig.tar.bz2
   [ -s "$tarball" ] || die "the source of YADE $version could not be fetched: $(grep -m1 '^E: ' "$store/fetch.log" || tail -1 "$store/fetch.log")"
   echo "$sha256  $tarball" | sha256sum --check --quiet || die "the source of YADE $version has a wrong checksum: $tarball; delete it and try again"
-  rm -rf "$source.part" "$source"
-  mkdir -p "$source.part"
-  # Bzip2 from Python: one package less.
-  $python -c 'import sys, tarfile
-with tarfile.open(sys.argv[1]) as archive:
-    archive.extractall(sys.argv[2], **({"filter": "data"} if hasattr(tarfile, "data_filter") else {}))' "$tarball" "$source.part"
-  mv "$source.part/"*/ "$source"
-  rm -rf "$source.part" "$apt"
+  unpack "$tarball"
+  rm -rf "$apt"
 }
 
 build() {
   echo "dembark: building YADE $version, once, into $store" >&2
-  export PATH=/usr/bin:$PATH
+  [ "$python" != /usr/bin/python3 ] || export PATH=/usr/bin:$PATH
   "$here/build.py" --name YADE --log "$store/build.log" --resume "make yade-engine" -- \
     cmake -G Ninja -S "$source" -B "$store/build" "${flags[@]}" -DPYTHON_VERSION="$pyversion" -DCMAKE_INSTALL_PREFIX="$prefix" \
           -DCMAKE_PROJECT_Yade_INCLUDE="$here/yade/targets.cmake" -DDEMBARK_PLUGIN_DIR="$here/../plugins/yade" \
@@ -101,7 +114,7 @@ build() {
   rm -rf "$store/build"
 }
 
-[ -e "$source/core/Scene.hpp" ] || fetch
+[ -e "$source/core/Scene.hpp" ] || if [ -n "${YADE_ARCHIVE:-}" ]; then given; else fetch; fi
 packaged || build
 touch "$store/.complete"
 answer "$prefix" "$source"
