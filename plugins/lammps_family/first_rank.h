@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "dembark/impact/archive.hpp"
+#include "dembark/archive.hpp"
 
 namespace dembark_family {
 
@@ -60,12 +60,12 @@ class FirstRank {
       wrong = e.what();
     }
     if (ranks_ == 1) return wrong;
-    std::vector<double> shared = dembark::impact::to_numbers(record);
+    std::vector<double> shared = dembark::to_numbers(record);
     shared.push_back(double(wrong.size()));
     MPI_Bcast(shared.data(), int(shared.size()), MPI_DOUBLE, 0, world_);
     wrong.resize(std::size_t(shared.back()));
     shared.pop_back();
-    dembark::impact::from_numbers(shared, record);
+    dembark::from_numbers(shared, record);
     if (!wrong.empty()) MPI_Bcast(wrong.data(), int(wrong.size()), MPI_CHAR, 0, world_);
     return wrong;
   }

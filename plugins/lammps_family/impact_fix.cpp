@@ -20,7 +20,7 @@ ImpactFix::ImpactFix(LAMMPS* lmp, int narg, char** arg, const char* mesh) : Shar
   checked([&] { impacts_ = std::make_unique<Coupling>(read_command({arg + std::min(3, narg), arg + narg}, atom->ntypes, mesh)); });
   restart_global = 1;
   vector_flag = 1;
-  size_vector = int(to_numbers(impacts_->report).size());
+  size_vector = int(dembark::to_numbers(impacts_->report).size());
   extvector = 0;
   global_freq = 1;
   local_flag = 1;
@@ -164,7 +164,7 @@ void ImpactFix::fill_local() {
     if (c.normal_force > 0.0) std::copy_n(table_row(c).begin(), int(local_columns), array_local[size_local_rows++]);
 }
 
-double ImpactFix::compute_vector(int k) { return to_numbers(impacts_->report)[std::size_t(k)]; }
+double ImpactFix::compute_vector(int k) { return dembark::to_numbers(impacts_->report)[std::size_t(k)]; }
 
 double ImpactFix::memory_usage() { return impacts_->memory() + double(local_capacity_) * local_columns * sizeof(double); }
 

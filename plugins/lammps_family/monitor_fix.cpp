@@ -201,8 +201,15 @@ void MonitorFix::write_restart(FILE* file) {
   const MonitorRun::State mine = run_.state();
   std::vector<MonitorRun::State> all(std::size_t(comm->nprocs), MonitorRun::State{});
   MPI_Gather(&mine, int(sizeof mine), MPI_BYTE, all.data(), int(sizeof mine), MPI_BYTE, 0, world);
+  if (comm->me != 0) return;
   const std::vector<double> saved = run_.saved(all);
-  if (comm->me == 0) write_part(file, {{saved.data(), saved.size() * sizeof(double)}});
+  const double count = double(saved.size() + 1);
+  write_part(file, {{&count, sizeof count}, {saved.data(), saved.size() * sizeof(double)}});
+}
+
+void MonitorFix::restart(char* buffer) {
+  const double* const numbers = reinterpret_cast<const double*>(buffer);  // the engine hands over the numbers without their size
+  checked([&] { run_.restore({numbers + 1, numbers + std::size_t(numbers[0])}, comm->me, comm->nprocs); });
 }
 
 }  // namespace dembark_family

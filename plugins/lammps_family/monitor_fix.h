@@ -22,7 +22,7 @@ class MonitorFix : public GrainFix {
   void end_of_step() override;
   double compute_vector(int n) override;
   void write_restart(FILE* file) override;
-  void restart(char* buffer) override { run_.restore(buffer, comm->me, comm->nprocs); }
+  void restart(char* buffer) override;
 
  protected:
   static constexpr int history_numbers = dembark::monitor_history_numbers;

@@ -90,7 +90,7 @@ void bind_sph(nb::module_& m) {
         if (const char* const wrong = state.error()) throw std::invalid_argument(wrong);
         return column(
             values.shape(0), [](std::size_t i) { return i; },
-            [&](std::size_t i) { return inverse ? state.density_at(values(i)) : state.pressure(values(i)); });
+            [&](std::size_t i) { return inverse ? initial_density(state, values(i)) : state.pressure(values(i)); });
       },
       "density"_a, "sound_speed"_a, "gamma"_a, "tension"_a, "inverse"_a, "values"_a);
 

@@ -7,6 +7,7 @@
 #include <core/Body.hpp>
 #include <core/GlobalEngine.hpp>
 
+#include "SavedFormat.hpp"
 #include "attributes.hpp"
 #include "dembark/capillary/liquid_ledger.hpp"
 
@@ -105,3 +106,5 @@ private:
 REGISTER_SERIALIZABLE(CapillaryLiquid);
 
 }  // namespace yade
+
+DEMBARK_SAVED_FORMAT(CapillaryLiquid, 1)

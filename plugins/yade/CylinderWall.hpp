@@ -5,6 +5,7 @@
 #include <pkg/common/Sphere.hpp>
 
 #include "WallContact.hpp"
+#include "SavedFormat.hpp"
 #include "attributes.hpp"
 
 namespace yade {
@@ -31,7 +32,11 @@ public:
 	void go(const shared_ptr<Shape>&, shared_ptr<Bound>&, const Se3r&, const Body*) override;
 	FUNCTOR1D(CylinderWall);
 	// clang-format off
-	YADE_CLASS_BASE_DOC(Bo1_CylinderWall_Aabb,BoundFunctor,"Box around a :yref:`CylinderWall`, without end along its axis. In a periodic cell the axis must be y or z, the collider needs allowBiggerThanPeriod=True, and the cylinder must fit between its own images.");
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Bo1_CylinderWall_Aabb,BoundFunctor,"Box around a :yref:`CylinderWall`, without end along its axis. In a periodic cell the axis must be y or z, the collider needs allowBiggerThanPeriod=True, and the cylinder must fit between its own images.",
+		, /*ctor*/
+		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
+	);
 	// clang-format on
 };
 REGISTER_SERIALIZABLE(Bo1_CylinderWall_Aabb);
@@ -43,9 +48,15 @@ public:
 	FUNCTOR2D(CylinderWall, Sphere);
 	DEFINE_FUNCTOR_ORDER_2D(CylinderWall, Sphere);
 	// clang-format off
-	YADE_CLASS_BASE_DOC(Ig2_CylinderWall_Sphere_ScGeom,IGeomFunctor,"Contact of a sphere with the inside of a :yref:`CylinderWall`. The normal points to the axis; :yref:`GenericSpheresContact.refR1` is 1e8 times the sphere's radius, as the other walls' with hertzian=True.");
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Ig2_CylinderWall_Sphere_ScGeom,IGeomFunctor,"Contact of a sphere with the inside of a :yref:`CylinderWall`. The normal points to the axis; :yref:`GenericSpheresContact.refR1` is 1e8 times the sphere's radius, as the other walls' with hertzian=True.",
+		, /*ctor*/
+		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
+	);
 	// clang-format on
 };
 REGISTER_SERIALIZABLE(Ig2_CylinderWall_Sphere_ScGeom);
 
 }  // namespace yade
+
+DEMBARK_SAVED_FORMAT(CylinderWall, 1)

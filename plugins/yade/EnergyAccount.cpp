@@ -15,6 +15,7 @@
 
 #include "ContactView.hpp"
 #include "FinnieRabinowicz.hpp"
+#include "SavedFormat.hpp"
 #include "WallMotion.hpp"
 #include "attributes.hpp"
 #include "dembark/energy_ledger.hpp"
@@ -83,6 +84,12 @@ private:
 	std::mutex                         guard;
 };
 REGISTER_SERIALIZABLE(EnergyAccount);
+
+}  // namespace yade
+
+DEMBARK_SAVED_FORMAT(EnergyAccount, 1)
+
+namespace yade {
 
 YADE_PLUGIN((EnergyAccount));
 
@@ -155,7 +162,13 @@ void EnergyAccount::preSave(EnergyAccount&) {
 }
 
 void EnergyAccount::postLoad(EnergyAccount&) {
-	if (saved.size() == ::dembark::energy_ledger_size) std::memcpy(static_cast<void*>(&ledger), saved.data(), sizeof ledger);
+	if (saved.empty()) return;
+	if (saved.size() != ::dembark::energy_ledger_size)
+		fail("EnergyAccount: the saved account has " + std::to_string(saved.size()) + " numbers, not " +
+		     std::to_string(::dembark::energy_ledger_size) +
+		     ": it is damaged, or that of another version of dembark; set the scene up anew, or go on with the version that saved "
+		     "it");
+	std::memcpy(static_cast<void*>(&ledger), saved.data(), sizeof ledger);
 	saved.clear();
 }
 

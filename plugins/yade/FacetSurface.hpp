@@ -8,7 +8,9 @@
 #include <pkg/common/Facet.hpp>
 #include <pkg/common/Sphere.hpp>
 
+#include "SavedFormat.hpp"
 #include "WallContact.hpp"
+#include "attributes.hpp"
 #include "dembark/surface/surface_contacts.hpp"
 
 namespace yade {
@@ -34,6 +36,7 @@ public:
 		((long,handedOver,0,Attr::readonly,"Number of contacts that have been handed to another facet so far"))
 		, /*ctor*/
 		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.def("readStl",&FacetSurface::readStl,(boost::python::arg("path"),boost::python::arg("precision")=1e-8),"Triangles of an STL file, text or binary, in the unit of the file: lists of three corners. Those without area, and those given again within the precision, are left out.")
 		.staticmethod("readStl")
 	);
@@ -66,11 +69,17 @@ public:
 	FUNCTOR2D(Facet, Sphere);
 	DEFINE_FUNCTOR_ORDER_2D(Facet, Sphere);
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS(Ig2_FacetSurface_Sphere_ScGeom,IGeomFunctor,"Contact of a sphere with a :yref:`Facet` of a :yref:`FacetSurface`, in place of :yref:`Ig2_Facet_Sphere_ScGeom`. :yref:`GenericSpheresContact.refR1` is 1e8 times the sphere's radius, as the other walls' with hertzian=True.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(Ig2_FacetSurface_Sphere_ScGeom,IGeomFunctor,"Contact of a sphere with a :yref:`Facet` of a :yref:`FacetSurface`, in place of :yref:`Ig2_Facet_Sphere_ScGeom`. :yref:`GenericSpheresContact.refR1` is 1e8 times the sphere's radius, as the other walls' with hertzian=True.",
 		((shared_ptr<FacetSurface>,surface,,,"The :yref:`FacetSurface` among the engines. Required."))
+		, /*ctor*/
+		, /*py*/
+		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 	);
 	// clang-format on
 };
 REGISTER_SERIALIZABLE(Ig2_FacetSurface_Sphere_ScGeom);
 
 }  // namespace yade
+
+DEMBARK_SAVED_FORMAT(FacetSurface, 1)
+DEMBARK_SAVED_FORMAT(Ig2_FacetSurface_Sphere_ScGeom, 1)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
 #include <typeinfo>
 #include <vector>
 
@@ -14,6 +15,8 @@
 
 #include "ContactView.hpp"
 #include "FinnieRabinowicz.hpp"
+#include "SavedFormat.hpp"
+#include "SavedNumbers.hpp"
 #include "attributes.hpp"
 #include "dembark/integration/monitor_run.hpp"
 #include "engine_order.hpp"
@@ -39,7 +42,7 @@ public:
 		((string,reaction,"warn",,"What follows when a sample is beyond these limits: 'report', 'warn', 'stop' or 'adapt'"))
 		((long,rows,0,,"With 'adapt': steps of the length that O.dt had at first between two rows, at whose ends O.dt may change"))
 		((long,impacts,0,,"Every how many a binary impact is integrated anew, among those that begin at a sample; 0 = none. Contacts of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz` without liquid"))
-		((vector<Real>,saved,,Attr::hidden,"The tallies, when the scene is saved"))
+		((string,saved,"",Attr::hidden,"The tallies, when the scene is saved"))
 		((vector<Real>,histories,,Attr::hidden,"Accelerations of each body by id in the last steps"))
 		((long,step,-1,Attr::readonly,"Last step that was seen; -1 = none"))
 		, /*ctor*/
@@ -67,6 +70,12 @@ private:
 	::dembark::MonitorRun run;
 };
 REGISTER_SERIALIZABLE(IntegrationMonitor);
+
+}  // namespace yade
+
+DEMBARK_SAVED_FORMAT(IntegrationMonitor, 1)
+
+namespace yade {
 
 YADE_PLUGIN((IntegrationMonitor));
 
@@ -253,10 +262,15 @@ void IntegrationMonitor::shorten(const NewtonIntegrator& newton, Real now) {
 	histories.clear();
 }
 
-void IntegrationMonitor::preSave(IntegrationMonitor&) { saved = run.saved({run.state()}); }
+void IntegrationMonitor::preSave(IntegrationMonitor&) { saved = dembark_yade::encode(run.saved({run.state()})); }
 
 void IntegrationMonitor::postLoad(IntegrationMonitor&) {
-	if (!saved.empty()) run.restore(reinterpret_cast<const char*>(saved.data()));
+	if (saved.empty()) return;
+	try {
+		run.restore(dembark_yade::decode(saved));
+	} catch (const std::invalid_argument& wrong) {
+		fail(std::string("IntegrationMonitor: ") + wrong.what());
+	}
 	saved.clear();
 }
 

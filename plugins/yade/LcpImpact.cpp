@@ -228,13 +228,13 @@ void LcpImpact::findContacts(double reach, std::vector<impact::Contact>& contact
 /// Makes the model, anew where anything about it has changed, O.dt too; the state is carried over.
 void LcpImpact::prepare() {
 	const impact::Settings now = settings();
-	if (system && impact::to_numbers(now) == impact::to_numbers(system->settings())) return;
+	if (system && ::dembark::to_numbers(now) == ::dembark::to_numbers(system->settings())) return;
 	const bool                begins = !system;
 	const std::vector<double> state  = system ? system->state() : std::vector<double>();
 	system                           = std::make_unique<impact::System>(now);
 	if (!begins) return system->restore(state);
 	if (savedState.empty()) return;
-	impact::Archive saved(dembark_yade::decode(savedState));
+	::dembark::Archive saved(dembark_yade::decode(savedState));
 	archive(saved);
 }
 
@@ -296,9 +296,9 @@ void LcpImpact::pushWalls() {
 }
 
 /// What saved scenes keep: the state of the model, and where its file of impacts ends.
-void LcpImpact::archive(impact::Archive& a) {
-	impact::FormatVersion format{3.0};
-	std::vector<double>   state = system->state();
+void LcpImpact::archive(::dembark::Archive& a) {
+	::dembark::FormatVersion format{3.0};
+	std::vector<double>      state = system->state();
 	a.all(std::tie(format, state, file));
 	a.end();
 	if (a.reading()) system->restore(state);
@@ -306,7 +306,7 @@ void LcpImpact::archive(impact::Archive& a) {
 
 void LcpImpact::preSave(LcpImpact&) {
 	if (!system) return;
-	impact::Archive out;
+	::dembark::Archive out;
 	archive(out);
 	savedState = dembark_yade::encode(out.numbers());
 }

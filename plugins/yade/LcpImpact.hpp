@@ -114,7 +114,7 @@ private:
 	void                        moveBack() const;
 	void                        pushWalls();
 	void                        writeImpacts();
-	void                        archive(::dembark::impact::Archive&);
+	void                        archive(::dembark::Archive&);
 	std::string                 wallName(std::size_t number) const;
 
 	std::unique_ptr<::dembark::impact::System> system;
@@ -139,4 +139,5 @@ REGISTER_SERIALIZABLE(LogImpact);
 
 }  // namespace yade
 
+DEMBARK_SAVED_FORMAT(LogWall, 1)
 DEMBARK_SAVED_FORMAT(LcpImpact, 1)

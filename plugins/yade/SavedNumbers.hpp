@@ -19,7 +19,7 @@ inline std::string encode(const std::vector<double>& numbers) {
 inline std::vector<double> decode(const std::string& text) {
 	std::vector<double> numbers;
 	char*               next = nullptr;
-	for (const char* at = text.c_str(); *at; at = next + 1) numbers.push_back(std::strtod(at, &next));
+	for (const char* at = text.c_str(); *at; at = *next ? next + 1 : next) numbers.push_back(std::strtod(at, &next));
 	return numbers;
 }
 

@@ -112,7 +112,7 @@ sph::Solver& SphFluid::fluid() {
 		for (std::size_t i = 0; i < firstPositions.size(); ++i) {
 			x.push_back(vec(firstPositions[i]));
 			v.push_back(vec(firstVelocities[i]));
-			rho.push_back(s.state.density_at(firstPressures[i]));
+			rho.push_back(sph::initial_density(s.state, firstPressures[i]));
 		}
 		if (x.empty()) fail("SphFluid: there is no fluid; give it particles by addParticles");
 		auto        made = std::make_unique<sph::Solver>(s, std::move(x), std::move(rho), std::move(v), sph::best_loops());

@@ -5,6 +5,7 @@
 #include <core/InteractionLoop.hpp>
 
 #include "ContactPacks.hpp"
+#include "SavedFormat.hpp"
 #include "attributes.hpp"
 
 namespace yade {
@@ -50,3 +51,5 @@ private:
 REGISTER_SERIALIZABLE(SphereContactLoop);
 
 }  // namespace yade
+
+DEMBARK_SAVED_FORMAT(SphereContactLoop, 1)

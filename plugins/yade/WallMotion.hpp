@@ -5,6 +5,7 @@
 
 #include <core/GlobalEngine.hpp>
 
+#include "SavedFormat.hpp"
 #include "attributes.hpp"
 #include "dembark/energy_ledger.hpp"
 #include "dembark/motion/prescribed_motion.hpp"
@@ -72,3 +73,5 @@ private:
 REGISTER_SERIALIZABLE(WallMotion);
 
 }  // namespace yade
+
+DEMBARK_SAVED_FORMAT(WallMotion, 1)

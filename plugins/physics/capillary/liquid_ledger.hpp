@@ -276,19 +276,21 @@ class LiquidLedger {
       });
     return text.str();
   }
-  /// std::runtime_error for what another version saved.
+  /// std::runtime_error for what another version saved, and for what is incomplete.
   void restore(const std::string& saved) {
     std::istringstream text(saved);
     std::string found;
     std::size_t wall_count = 0, grains = 0;
     text >> found >> lost >> added >> expected >> counted_ >> wall_count >> grains;
     if (found != format || !text) throw std::runtime_error("the liquid was saved by another version of dembark; start from new files");
-    walls.assign(wall_count, {});
+    const bool fits = wall_count <= saved.size() && grains <= saved.size();  // each has a character or more
+    walls.assign(fits ? wall_count : 0, {});
     for (LiquidWall& wall : walls) text >> wall.name >> wall.pool >> wall.share >> wall.part;
-    resize(grains);
+    resize(fits ? grains : 0);
     each_tally([&](std::vector<double>& tally) {
       for (double& number : tally) text >> number;
     });
+    if (!fits || !text) throw std::runtime_error("the saved liquid is incomplete: its file is damaged; start from another one");
   }
 
  private:

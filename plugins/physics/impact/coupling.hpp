@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "archive.hpp"
+#include "../archive.hpp"
 #include "command.hpp"
 #include "impact_file.hpp"
 #include "last_forces.hpp"

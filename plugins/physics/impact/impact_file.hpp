@@ -74,7 +74,10 @@ class ImpactFile {
   void put(const char* mode, const std::string& lines) {
     std::FILE* file = std::fopen(path_.c_str(), mode);
     const bool written = file && std::fwrite(lines.data(), 1, lines.size(), file) == lines.size();
-    if (!file || std::fclose(file) != 0 || !written) fail(std::string("cannot be written: ") + std::strerror(errno));
+    int why = errno;
+    const bool closed = file && std::fclose(file) == 0;
+    if (written) why = errno;
+    if (!written || !closed) fail(std::string("cannot be written: ") + std::strerror(why));
     bytes_ += static_cast<long long>(lines.size());
   }
 

@@ -17,10 +17,10 @@
 #include <tuple>
 #include <vector>
 
+#include "../archive.hpp"
 #include "../energy_lcp.hpp"
 #include "../finnie_rabinowicz.hpp"
 #include "../vec3.hpp"
-#include "archive.hpp"
 
 namespace dembark {
 namespace impact {

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -74,6 +75,7 @@ struct ShortestContact {
     two = b;
   }
   void merge(const ShortestContact& other) { add(other.steps, other.one, other.two); }
+  auto fields() { return std::tie(steps, one, two); }
 };
 constexpr long monitor_wall = -2;
 
@@ -88,6 +90,7 @@ struct MonitorTally {
     contact.merge(other.contact);
     impacts.merge(other.impacts);
   }
+  auto fields() { return std::tie(errors, contact, impacts); }
 };
 
 /// The sums of a whole run, and those since the last row, at which `adapt` acts.

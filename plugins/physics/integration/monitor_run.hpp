@@ -7,13 +7,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "../archive.hpp"
 #include "monitor.hpp"
 #include "shadow_impact.hpp"
 
@@ -245,6 +246,8 @@ class MonitorRun {
     double next_row = -1.0;  // its step
     std::int64_t level = 0;  // the step in use is that of the deck over 2^level
     std::int64_t said = 0;   // bits of the kinds of findings that were reported
+
+    auto fields() { return std::tie(run, row, step, next_row, level, said); }
   };
   State state() const {
     State now = state_;
@@ -253,25 +256,25 @@ class MonitorRun {
     return now;
   }
   /// What restart files keep: the states of each process by themselves, for a run that goes on adds to the same tallies.
-  std::vector<double> saved(const std::vector<State>& all) const {
-    std::vector<double> out{double(all.size()), double(sizeof(State)), double(shadows.all().size()), monitor.settings.scales.length};
-    append(out, all);
-    append(out, shadows.all());
-    return out;
+  std::vector<double> saved(std::vector<State> all) const {
+    std::vector<ShadowImpact> under_way = shadows.all();
+    double length = monitor.settings.scales.length;
+    Archive out;
+    archive(out, length, all, under_way);
+    return out.numbers();
   }
-  /// On another number of processes the first has the tallies of all. What another version wrote is left.
-  void restore(const char* buffer, int process = 0, int processes = 1) {
-    double head[4];
-    std::memcpy(head, buffer, sizeof head);
-    if (head[1] != double(sizeof(State))) return;
-    if (mean_length) monitor.settings.scales.length = head[3];
+  /// On another number of processes the first has the tallies of all. Throws std::invalid_argument with one line where the numbers are not
+  /// such a state.
+  void restore(std::vector<double> numbers, int process = 0, int processes = 1) {
+    std::vector<State> all;
+    std::vector<ShadowImpact> under_way;
+    double length = 0.0;
+    Archive in(std::move(numbers));
+    archive(in, length, all, under_way);
+    if (all.empty()) throw std::invalid_argument("the saved state is incomplete or damaged: it is that of no process");
+    if (mean_length) monitor.settings.scales.length = length;
     mean_length = false;
-    std::vector<State> all(std::size_t(head[0]), State{});
-    std::vector<ShadowImpact> impacts_then(static_cast<std::size_t>(head[2]));
-    std::memcpy(static_cast<void*>(all.data()), buffer + sizeof head, all.size() * sizeof(State));
-    std::memcpy(static_cast<void*>(impacts_then.data()), buffer + sizeof head + all.size() * sizeof(State),
-                impacts_then.size() * sizeof(ShadowImpact));
-    shadows.restore(std::move(impacts_then));
+    shadows.restore(std::move(under_way));
     state_ = all[0];
     monitor.run = monitor.row = {};
     for (int p = 0; p < int(all.size()); ++p)
@@ -282,12 +285,10 @@ class MonitorRun {
   }
 
  private:
-  template <class T>
-  static void append(std::vector<double>& out, const std::vector<T>& what) {
-    static_assert(sizeof(T) % sizeof(double) == 0);
-    const std::size_t before = out.size();
-    out.resize(before + what.size() * (sizeof(T) / sizeof(double)));
-    if (!what.empty()) std::memcpy(out.data() + before, what.data(), what.size() * sizeof(T));
+  static void archive(Archive& a, double& length, std::vector<State>& all, std::vector<ShadowImpact>& under_way) {
+    FormatVersion format{1.0};
+    a.all(std::tie(format, length, all, under_way));
+    a.end();
   }
   MonitorTally merged(MonitorTally tally) const {
     merge_processes(tally);

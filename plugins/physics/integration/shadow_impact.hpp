@@ -16,6 +16,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
 #include "../contact.hpp"
@@ -26,6 +27,8 @@ namespace dembark {
 /// Velocity of body 1 against body 2 (m/s), and angular velocities (rad/s).
 struct PairMotion {
   Vec3<double> velocity{}, spin_1{}, spin_2{};
+
+  auto fields() { return std::tie(velocity, spin_1, spin_2); }
 };
 inline PairMotion pair_motion(const ContactBodies& b) { return {b.velocity_1 - b.velocity_2, b.angular_velocity_1, b.angular_velocity_2}; }
 
@@ -200,6 +203,8 @@ struct ShadowImpact {
   double radius_1 = 0.0, radius_2 = 0.0;  ///< m
   double speed = 0.0;                     ///< m/s, of the one against the other at the touch
   double elapsed = 0.0, duration = 0.0;   ///< s, since then, and in contact under the reference
+
+  auto fields() { return std::tie(one, two, expected, momentum, mass_1, mass_2, radius_1, radius_2, speed, elapsed, duration); }
 
   /// Begins with bodies that overlap for the first time, less than `step` (s) after their touch. False where there is nothing to compare.
   bool begin(const ContactParameters& p, ContactBodies b, long first, long second, double step) {

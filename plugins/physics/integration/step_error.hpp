@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <tuple>
 
 #include "../contact_energy.hpp"  // Dofs
 
@@ -81,6 +82,7 @@ struct ErrorTally {
     if (other.body >= 0) note(other.largest, other.body);
   }
   double rms() const { return count > 0.0 ? std::sqrt(squares / count) : 0.0; }
+  auto fields() { return std::tie(largest, squares, count, exceeded, body); }
 
  private:
   void note(double value, long id) {
@@ -104,6 +106,7 @@ struct StepErrors {
     velocity.merge(other.velocity);
     spin.merge(other.spin);
   }
+  auto fields() { return std::tie(position, velocity, spin); }
 
  private:
   static double size(double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); }

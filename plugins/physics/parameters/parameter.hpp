@@ -2,8 +2,9 @@
 #pragma once
 
 #include <cmath>
-#include <cstdio>
 #include <string>
+
+#include "../message_text.hpp"
 
 namespace dembark {
 
@@ -31,12 +32,6 @@ struct Parameter {         // NOLINT(clang-analyzer-optin.performance.Padding)
   }
   bool required() const { return std::isnan(otherwise); }
 };
-
-inline std::string number_text(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
 
 /// What values are right: "> 0 and <= 1".
 inline std::string range_text(const Parameter& p) {

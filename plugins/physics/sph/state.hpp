@@ -17,6 +17,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+
+#include "../message_text.hpp"
 
 namespace dembark::sph {
 
@@ -66,5 +69,12 @@ struct Tait {
     return stiffness() * ((gamma == 1.0 ? x : std::pow(x, gamma)) - 1.0);
   }
 };
+
+/// rho at a pressure p (Pa) that a user gives. Throws std::invalid_argument with one line for one that no density has.
+inline double initial_density(const Tait& state, double p) {
+  if (p > -state.stiffness()) return state.density_at(p);
+  throw std::invalid_argument("a pressure must be > -" + number_text(state.stiffness()) + " Pa (density sound_speed^2/gamma), not " +
+                              number_text(p) + " Pa");
+}
 
 }  // namespace dembark::sph

@@ -147,6 +147,9 @@ TEST_CASE("the file of impacts: begun, gone on with, gone") {
   std::remove(path.c_str());
   CHECK_THROWS_WITH(again.resume(path, 1), Catch::Contains("is not there"));
   CHECK_THROWS_WITH(file.begin("/no/such/folder/file.txt", ""), Catch::Contains("cannot be written: No such file"));
+  // A full disk, found when a line is written and when the file is closed.
+  for (const std::size_t length : {std::size_t(1), std::size_t(100000)})
+    CHECK_THROWS_WITH(file.begin("/dev/full", std::string(length, 'x')), Catch::Contains("cannot be written: No space left"));
 }
 
 TEST_CASE("a step done again loses once more what contacts held that are no candidates any more") {

@@ -349,4 +349,8 @@ TEST_CASE("what a restart file holds brings everything back", "[liquid]") {
   CHECK(again.total() == row.total());
   CHECK(again.ledger.saved(true) == saved);
   CHECK_THROWS_WITH(again.ledger.restore("liquid-1 0 0 0"), Catch::Contains("another version"));
+  // Cut off behind any of its words: none of the walls and tallies is taken for zero.
+  for (std::size_t end = saved.find(' '); end != std::string::npos; end = saved.find(' ', end + 1))
+    CHECK_THROWS_AS(again.ledger.restore(saved.substr(0, end)), std::runtime_error);
+  CHECK_THROWS_WITH(again.ledger.restore("liquid-2 0 0 0 0 -1 0"), Catch::Contains("incomplete"));
 }

@@ -2,9 +2,10 @@
 
 import os
 import random
+import re
 
 from columns import dilute_column
-from scene_results import advance, place, write_results
+from scene_results import advance, place, refusal, write_results
 from yade import dembark, utils
 
 PAIR = dict(restitution=0.6, staticFriction=0.5, kineticFriction=0.3, criticalSlipDistance=1e-5)
@@ -221,6 +222,19 @@ def save_load():
         found[ending] = {"before": before, "after": after, "straight": straight, "resumed": dembark.energies()}
         os.remove(name)
     return found
+
+
+def cut_ledger():
+    """What loading says of an account whose saved ledger has a number less."""
+    column(count=1)
+    advance(20)
+    O.save("cut.xml", quiet=True)
+    text = open("cut.xml", encoding="utf-8").read()
+    saved = re.search(r"<saved>\s*<count>(\d+)</count>.*?</saved>", text, re.DOTALL)
+    shorter = re.sub(r"<count>\d+", f"<count>{int(saved[1]) - 1}", saved[0])
+    shorter = re.sub(r"\s*<item>[^<]*</item>\s*</saved>", "</saved>", shorter)
+    open("cut.xml", "w", encoding="utf-8").write(text.replace(saved[0], shorter))
+    return refusal(lambda: O.load("cut.xml", quiet=True))
 
 
 def come_and_go():

@@ -193,12 +193,17 @@ def messages():
         sunk = block((0.1, 0.05, 0), 1.0, (1, 1, 1), plane=True)
         fluid.addBody(sunk, dembark.lattice((0.07, 0.02), (0.13, 0.08), DX))
 
+    def under_tension(fluid):
+        fluid.tension = True
+        fluid.addParticles([(1, 0, 0)], pressures=[-1000.0 * fluid.soundSpeed**2 / 7])
+
     said = {
         "spacing": attribute("spacing", 0.0), "sound": attribute("soundSpeed", -1.0), "kernel": attribute("kernel", "gauss"),
         "smoothing": attribute("smoothing", 0.5), "substeps": attribute("substeps", 0), "damping": with_newton(damping=0.2),
         "order": after(lambda fluid: setattr(O, "engines", [ForceResetter(), O.engines[-1], fluid])),
         "long": after(lambda fluid: setattr(O, "dt", 2e-3), 2),
         "overlap": after(put_into_the_water),
+        "torn": after(under_tension),
         "long sub-steps": after(lambda fluid: (setattr(O, "dt", 2e-4), setattr(fluid, "substeps", 10)), 11),
     }
     fluid = pool((0, -G, 0), (0, 0), (0.2, 0.1), 0.2)

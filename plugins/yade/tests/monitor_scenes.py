@@ -106,8 +106,23 @@ def bouncing(reaction):
 
 
 def saved():
-    """The same without and with a scene that is saved and loaded on the way."""
-    return [bed(), bed(stop=703)]
+    """The same without and with a scene that is saved and loaded on the way, in each format."""
+    return [bed(), *(bed(stop=703, path=f"bed.{ending}") for ending in ("yade.gz", "xml", "bin"))]
+
+
+def on_a_wall():
+    """Figures of a scene that is saved after the shortest contact, which is that of a wall, and loaded."""
+    found = []
+    for path in (None, "wall.xml", "wall.bin"):
+        bodies = [utils.wall(0, 2), grain((0, 0, 1.001 * R)), grain((0, 0, 10 * R))]
+        scene_with(bodies, IntegrationMonitor(speed=1.0, every=1), 1e-5, gravity=(0, 0, -9.81))
+        O.run(250, True)
+        if path:
+            O.save(path, quiet=True)
+            O.load(path, quiet=True)
+        O.run(50, True)
+        found.append(O.engines[3].figures())
+    return found
 
 
 def bed(steps=1500, stop=None, path="bed.yade.gz"):

@@ -3,6 +3,7 @@
 import builtins
 import math
 import os
+import re
 import sys
 
 from columns import dilute_column
@@ -208,6 +209,25 @@ def save_load(pair=None, **law_attributes):
 
 def save_load_partial_slip():
     return save_load(ROLLING, presliding="partial_slip", rollingResistance="elastic_plastic")
+
+
+def other_formats():
+    """What loading says of a scene in which one class is said to be of another format: of each class of dembark with attributes."""
+    O.reset()
+    bodies = [moving((0, 0, 0), 0.0025), Body(shape=CylinderWall(radius=0.1))]
+    place(bodies, DENSITY)
+    surface = FacetSurface()
+    O.engines = [surface, SphereContactLoop([Ig2_FacetSurface_Sphere_ScGeom(surface=surface)], [], []), CapillaryLiquid(), EnergyAccount(),
+                 IntegrationMonitor(), WallMotion(), LcpImpact(walls=[dict(bodies=[1], stiffness=1e7)])]
+    O.save("format.xml", quiet=True)
+    text = open("format.xml", encoding="utf-8").read()
+    said = {}
+    for name in ("FacetSurface", "Ig2_FacetSurface_Sphere_ScGeom", "SphereContactLoop", "CapillaryLiquid", "EnergyAccount",
+                 "IntegrationMonitor", "WallMotion", "LogWall", "CylinderWall"):
+        changed, found = re.subn(rf'(class_name="yade::{name}" tracking_level="\d" version=)"\d+"', r'\1"99"', text)
+        open("format.xml", "w", encoding="utf-8").write(changed)
+        said[name] = [found, refusal(lambda: O.load("format.xml", quiet=True))]
+    return said
 
 
 def energy():

@@ -198,6 +198,12 @@ def test_saved_account_goes_on(found, ending):
             assert case["resumed"][name] == pytest.approx(case["straight"][name], rel=1e-9, abs=1e-12 * case["straight"]["scale"]), name
 
 
+def test_a_saved_account_of_another_size_is_refused(yade):
+    """It would go on from zero, beside the kinetic energies of its bodies, with a false balance."""
+    line = yade.scenes("cut_ledger", script="energy_scenes.py")["cut_ledger"]
+    assert line.startswith("dembark: EnergyAccount: ") and "another version of dembark" in line and "\n" not in line
+
+
 def test_bodies_come_and_go(found):
     rows = found["come_and_go"]
     quiet, inserted, erased, flown, held, freed, pushed, shorter = rows

@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
 from rig.chains import CompressedChain, solitary_wave
 
-SCENES = "chains warned adapted saved lag messages".split()
+SCENES = "chains warned adapted saved on_a_wall lag messages".split()
 SCRIPT = "monitor_scenes.py"
 
 
@@ -74,9 +74,15 @@ def test_the_step_is_adapted_at_rows_whose_times_stay(found):
 
 
 def test_a_scene_that_was_saved_has_the_same_figures_to_the_bit(found):
-    one, other = found["saved"]
-    assert one == other
+    one, *others = found["saved"]
+    assert others == [one] * 3
     assert one["impacts"] > 2
+
+
+def test_so_has_one_whose_shortest_contact_is_that_of_a_wall(found):
+    one, *others = found["on_a_wall"]
+    assert (one["contact_body_1"], one["contact_body_2"]) == (1, -2)
+    assert others == [one] * 2
 
 
 def test_threads_make_no_difference(yade, found):

@@ -116,6 +116,7 @@ def test_frames_and_rows_can_be_read(found, tmp_path):
     ("points", "addWall must be a list of points"), ("out of plane", "has z = 1; in the plane it must be 0"),
     ("no body", "body 99 does not exist"), ("member", "belongs to the clump 2; add that"),
     ("body without particles", "body 2 has no points"), ("pressures", "pressures must be a list of 1 numbers (Pa)"),
+    ("torn", "SphFluid: a pressure must be > -"),
     ("stranger", "body 2 is not in the fluid"), ("twice", "body 2 is in the fluid already"), ("late", "the fluid has begun"),
     ("overlap", "m overlaps others: there are 1.92 times as many as in the lattice; leave out fluid where walls and bodies are"),
     ("gravity", "NewtonIntegrator.gravity has changed"), ("no fluid", "there is no fluid"), ("blows up", "the fluid blew up at t =")])

@@ -10,10 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "../vec3.hpp"
+#include "vec3.hpp"
 
 namespace dembark {
-namespace impact {
 
 /// Of what follows among the fields; numbers of another one are refused.
 struct FormatVersion {
@@ -63,7 +62,7 @@ class Archive {
   void operator()(FormatVersion& version) {
     double found = version.number;
     (*this)(found);
-    if (found != version.number) throw std::invalid_argument("impact state: not written by this version of dembark");
+    if (found != version.number) throw std::invalid_argument("the saved state is that of another version of dembark");
   }
   /// All has been read.
   void end() const {
@@ -72,7 +71,7 @@ class Archive {
 
  private:
   [[noreturn]] void wrong(const char* what) const {
-    throw std::invalid_argument("impact state: " + std::to_string(numbers_.size()) + " numbers " + what);
+    throw std::invalid_argument("the saved state is incomplete or damaged: its " + std::to_string(numbers_.size()) + " numbers " + what);
   }
   template <class List>
   void resize(List& list) {
@@ -103,5 +102,4 @@ void from_numbers(std::vector<double> numbers, T& value) {
   in.end();
 }
 
-}  // namespace impact
 }  // namespace dembark
