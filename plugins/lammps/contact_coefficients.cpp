@@ -14,12 +14,6 @@ using dembark::ContactParameters;
 namespace dembark_lammps {
 namespace {
 
-std::string list(const std::vector<std::string>& names) {
-  std::string text = names[0];
-  for (std::size_t k = 1; k < names.size(); ++k) text += (k + 1 < names.size() ? ", " : " or ") + names[k];
-  return text;
-}
-
 std::string types(int i, int j) { return "types " + std::to_string(i) + "-" + std::to_string(j); }
 
 /// Of all pairs, and not behind a word of the law that it belongs to.
@@ -66,7 +60,8 @@ double ContactCoefficients::number(const std::string& keyword, const char* text)
 template <class Option>
 void ContactCoefficients::choose(const std::string& keyword, const std::string& word, const std::vector<std::string>& names,
                                  Option& option) const {
-  if (!dembark::option_from_name(names, word, option)) fail(keyword + " '" + word + "' is unknown; it can be " + list(names));
+  if (!dembark::option_from_name(names, word, option))
+    fail(keyword + " '" + word + "' is unknown; it can be " + dembark::names_text(names));
 }
 
 void ContactCoefficients::settings(int narg, char** arg) {
@@ -119,7 +114,7 @@ void ContactCoefficients::settings(int narg, char** arg) {
     else if (keyword == "limit_force") choose(keyword, word(), off_on, options_.limit_force);
     else if (const dembark::Parameter* const known = dembark::parameter(keyword); known && is_keyword(*known))
       set(static_cast<ContactNumber>(known - dembark::contact_parameters), number(keyword, word()));
-    else fail("'" + keyword + "' is unknown; it can be " + list(keywords));
+    else fail("'" + keyword + "' is unknown; it can be " + dembark::names_text(keywords));
   }
   if (wet && dry) fail("capillary_model is for the cohesion bridge");
   if (wet) options_.cohesion = dembark::CohesionLaw::bridge;
@@ -159,7 +154,7 @@ std::vector<std::array<int, 2>> ContactCoefficients::coeff(int narg, char** arg)
       for (const dembark::Parameter& each : dembark::contact_parameters)
         if (each.scope != dembark::Scope::global) names.emplace_back(each.name);
       names.emplace_back("largest_radius");
-      fail("pair_coeff knows no '" + name + "'; it knows " + list(names));
+      fail("pair_coeff knows no '" + name + "'; it knows " + dembark::names_text(names));
     }
     if (k + 1 == narg) fail("pair_coeff: " + name + " needs a value");
     const double value = number("pair_coeff: " + name, arg[k + 1]);

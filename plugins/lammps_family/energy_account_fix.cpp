@@ -17,7 +17,7 @@ namespace {
 // Sums over the same atoms in another order differ by less.
 constexpr double round_off = 1e-14;
 
-dembark::Dofs six(const double* along, const double* about) { return {along[0], along[1], along[2], about[0], about[1], about[2]}; }
+dembark::SixVector six(const double* along, const double* about) { return {along[0], along[1], along[2], about[0], about[1], about[2]}; }
 
 }  // namespace
 
@@ -81,7 +81,7 @@ inline EnergyBody EnergyAccountFix::body(int i) const {
   dembark::Vec3<double> weight;
   for (const auto& [group, acceleration] : falls_)
     if (atom->mask[i] & group) weight += atom->rmass[i] * acceleration;
-  grain.set_forces(six(atom->f[i], atom->torque[i]), dembark::dofs(weight, {}));
+  grain.set_forces(six(atom->f[i], atom->torque[i]), dembark::six_vector(weight, {}));
   return grain;
 }
 

@@ -30,7 +30,7 @@ void SphFilms::begin(const std::vector<FixSphBody *> &fixes, const std::vector<s
     try {
       box.count = lattice_counts(2.0 * half[k], scene_.settings.spacing);
     } catch (const std::invalid_argument &wrong) {
-      refuse("slit_pressure: box " + names[k] + " has " + wrong.what());
+      refuse("slit_pressure: box " + names[k] + ": " + wrong.what());
     }
     const int all = box.count[0] * box.count[1] * box.count[2];
     int found[2] = {0, 0};  // on the lattice, and in the body

@@ -20,20 +20,13 @@
 #include "cohesion/cohesion.hpp"
 #include "contact_order.hpp"
 #include "finnie_rabinowicz.hpp"
+#include "message_text.hpp"
 #include "normal_force.hpp"
 #include "partial_slip.hpp"
 #include "rolling_resistance.hpp"
 #include "vec3.hpp"
 
 namespace dembark {
-
-/// False, and `option` as it was, for a word that is none of `names`, which stand in the order of the options.
-template <class Option>
-bool option_from_name(const std::vector<std::string>& names, const std::string& word, Option& option) {
-  const auto found = std::find(names.begin(), names.end(), word);
-  if (found != names.end()) option = static_cast<Option>(found - names.begin());
-  return found != names.end();
-}
 
 /// The friction of a contact. A second law makes this a structure of all, with the choice among them.
 typedef FinnieRabinowicz Friction;
@@ -51,13 +44,13 @@ struct ContactParameters {
   Cohesion cohesion{};
   RollingResistance rolling{};
 
-  /// The normal law, as it is without the switches above. Two held bodies, whose effective mass is infinite, have no impact that damping or
-  /// Hooke's stiffness could follow from: between them there is Hertz's spring alone.
+  /// The normal law, as it is without the switches above. Two frozen bodies, whose effective mass is infinite, have no impact that damping
+  /// or Hooke's stiffness could follow from: between them there is Hertz's spring alone.
   DEMBARK_FUNCTION NormalResponse<double> respond(double effective_radius, double effective_mass, double overlap,
                                                   double normal_velocity) const {
-    const bool held = std::isinf(effective_mass);
-    if (normal_law == NormalLaw::hertz || held)
-      return hertz(elasticity, effective_radius, held ? 0.0 : effective_mass, overlap, normal_velocity);
+    const bool frozen = std::isinf(effective_mass);
+    if (normal_law == NormalLaw::hertz || frozen)
+      return hertz(elasticity, effective_radius, frozen ? 0.0 : effective_mass, overlap, normal_velocity);
     return hooke(elasticity, characteristic_velocity, effective_radius, effective_mass, overlap, normal_velocity);
   }
   /// The spring's force grows with this power of the overlap.
@@ -87,7 +80,6 @@ struct ContactBodies {
   DEMBARK_FUNCTION double effective_radius() const { return reduced(radius_1, radius_2); }
   DEMBARK_FUNCTION double effective_mass() const { return reduced(mass_1, mass_2); }
   DEMBARK_FUNCTION Vec3<double> spin_2() const { return angular_velocity_2 + wall_spin; }
-  DEMBARK_FUNCTION Vec3<double> relative_spin() const { return angular_velocity_1 - spin_2(); }
   DEMBARK_FUNCTION ContactPair<double> pair() const {
     return {separation, velocity_1 - velocity_2, angular_velocity_1, spin_2(), radius_1, std::isinf(radius_2) ? 0.0 : radius_2};
   }

@@ -1,6 +1,7 @@
 // Energies of a contact: what its springs hold, and the power of each part of its force, so that all works of a run add up.
 //
-// Both engines move bodies by leapfrog: v(n+1/2) = v(n-1/2) + dt F(n)/m, x(n+1) = x(n) + dt v(n+1/2). Then
+// All engines move bodies by v(n+1/2) = v(n-1/2) + dt F(n)/m, x(n+1) = x(n) + dt v(n+1/2): YADE by leapfrog, LIGGGHTS and LAMMPS by
+// velocity Verlet, which has the same velocities at half steps. Then
 //
 //   m/2 v(n+1/2)^2 - m/2 v(n-1/2)^2 = F(n) . V(n) dt,   V(n) = [v(n-1/2) + v(n+1/2)] / 2,                                  (1)
 //
@@ -20,18 +21,18 @@
 namespace dembark {
 
 /// Of a body along x, y, z and about them: velocities and spins, forces and torques, masses and moments of inertia.
-typedef std::array<double, 6> Dofs;
+typedef std::array<double, 6> SixVector;
 
-DEMBARK_FUNCTION inline Dofs dofs(const Vec3<double>& along, const Vec3<double>& about) {
+DEMBARK_FUNCTION inline SixVector six_vector(const Vec3<double>& along, const Vec3<double>& about) {
   return {along.x, along.y, along.z, about.x, about.y, about.z};
 }
 
-DEMBARK_HOT double dot(const Dofs& a, const Dofs& b) {
+DEMBARK_HOT double dot(const SixVector& a, const SixVector& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5];
 }
 
 /// Number by number: a loop would be vectorized, and wide loads of what has just been written by halves stall.
-DEMBARK_HOT void add(Dofs& to, const Vec3<double>& along, const Vec3<double>& about) {
+DEMBARK_HOT void add(SixVector& to, const Vec3<double>& along, const Vec3<double>& about) {
   to[0] += along.x;
   to[1] += along.y;
   to[2] += along.z;
@@ -75,17 +76,17 @@ struct ContactLevers {
   DEMBARK_FUNCTION ContactLevers(const Vec3<double>& normal, const RelativeMotion& motion)
       : one(-motion.arm_1 * normal), two(motion.arm_2 * normal) {}
   /// Forces and torques on bodies 1 and 2 by this force on body 1.
-  DEMBARK_FUNCTION Dofs on_one(const Vec3<double>& force) const { return dofs(force, cross(one, force)); }
-  DEMBARK_FUNCTION Dofs on_two(const Vec3<double>& force) const { return dofs(-force, cross(force, two)); }
+  DEMBARK_FUNCTION SixVector on_one(const Vec3<double>& force) const { return six_vector(force, cross(one, force)); }
+  DEMBARK_FUNCTION SixVector on_two(const Vec3<double>& force) const { return six_vector(-force, cross(force, two)); }
   /// The same by a part, force or couple.
-  DEMBARK_FUNCTION Dofs on_one(std::size_t part, const Vec3<double>& load) const {
-    return part < force_part_count ? on_one(load) : dofs({}, load);
+  DEMBARK_FUNCTION SixVector on_one(std::size_t part, const Vec3<double>& load) const {
+    return part < force_part_count ? on_one(load) : six_vector({}, load);
   }
-  DEMBARK_FUNCTION Dofs on_two(std::size_t part, const Vec3<double>& load) const {
-    return part < force_part_count ? on_two(load) : dofs({}, -load);
+  DEMBARK_FUNCTION SixVector on_two(std::size_t part, const Vec3<double>& load) const {
+    return part < force_part_count ? on_two(load) : six_vector({}, -load);
   }
   /// m/s, of body 1 against body 2.
-  DEMBARK_FUNCTION Vec3<double> velocity(const Dofs& v, const Dofs& w) const {
+  DEMBARK_FUNCTION Vec3<double> velocity(const SixVector& v, const SixVector& w) const {
     return Vec3<double>{v[0] - w[0], v[1] - w[1], v[2] - w[2]} + cross({v[3], v[4], v[5]}, one) - cross({w[3], w[4], w[5]}, two);
   }
 };
@@ -96,21 +97,21 @@ struct ContactLevers {
 DEMBARK_FUNCTION inline void split_touching(ContactParts& parts, const Vec3<double>& normal, double overlap, double spring, double exponent,
                                             double normal_force, double stiffness, const Vec3<double>& tangential,
                                             const Vec3<double>& displacement, const SlipRings* rings) {
-  const Vec3<double> held = -stiffness * displacement;
+  const Vec3<double> elastic = -stiffness * displacement;
   parts[ContactPart::normal_elastic] = spring * normal;
   parts[ContactPart::normal_viscous] = (normal_force - spring) * normal;
-  parts[ContactPart::tangential_elastic] = held;
-  parts[ContactPart::tangential_viscous] = tangential - held;
+  parts[ContactPart::tangential_elastic] = elastic;
+  parts[ContactPart::tangential_viscous] = tangential - elastic;
   parts.normal_stored = spring * overlap / (1.0 + exponent);
   parts.tangential_stored = rings ? stored_energy(*rings, stiffness) : 0.5 * stiffness * dot(displacement, displacement);
 }
 
 /// Spring and dashpot of rolling resistance. `couple`: N m, on body 1; `angle`: theta after the step; `stiffness`: k_r.
 DEMBARK_FUNCTION inline void split_rolling(ContactParts& parts, const Vec3<double>& couple, const Vec3<double>& angle, double stiffness) {
-  const Vec3<double> held = -stiffness * angle;
+  const Vec3<double> elastic = -stiffness * angle;
   parts.count = contact_part_count;
-  parts[ContactPart::rolling_elastic] = held;
-  parts[ContactPart::rolling_viscous] = couple - held;
+  parts[ContactPart::rolling_elastic] = elastic;
+  parts[ContactPart::rolling_viscous] = couple - elastic;
   parts.rolling_stored = 0.5 * stiffness * dot(angle, angle);
 }
 

@@ -13,8 +13,8 @@
 namespace dembark {
 
 struct ContactTally {
-  std::vector<std::array<Dofs, contact_part_count>> loads;  ///< on each body that this process owns
-  std::array<bool, contact_part_count> present{};           ///< the parts that any contact has had; the others are zero
+  std::vector<std::array<SixVector, contact_part_count>> loads;  ///< on each body that this process owns
+  std::array<bool, contact_part_count> present{};                ///< the parts that any contact has had; the others are zero
   /// W and W/s, of each part on the bodies, were they moved as the wall is: with its velocity and acceleration of the moment.
   std::array<double, contact_part_count> wall_power{}, wall_rate{};
   double normal_stored = 0.0, tangential_stored = 0.0, rolling_stored = 0.0;  ///< J

@@ -20,44 +20,44 @@ namespace dembark {
 
 /// How a body moves.
 struct BodyMotion {
-  Dofs mass{};  ///< 0 where forces do not change the velocity; there the body is a wall to the others
-  Dofs velocity{};
+  SixVector mass{};  ///< 0 where forces do not change the velocity; there the body is a wall to the others
+  SixVector velocity{};
 
   DEMBARK_HOT bool is_free(std::size_t k) const { return mass[k] > 0.0; }
   DEMBARK_HOT bool is_free() const { return is_free(0) && is_free(1) && is_free(2) && is_free(3) && is_free(4) && is_free(5); }
   /// Of one of these, what belongs to the degrees of freedom that forces change, or to the others.
-  DEMBARK_HOT Dofs part(Dofs of, bool free) const {
+  DEMBARK_HOT SixVector part(SixVector of, bool free) const {
     for (std::size_t k = 0; k < of.size(); ++k)
       if (is_free(k) != free) of[k] = 0.0;
     return of;
   }
-  DEMBARK_HOT Dofs accelerated(Dofs by) const {
+  DEMBARK_HOT SixVector accelerated(SixVector by) const {
     for (std::size_t k = 0; k < by.size(); ++k) by[k] = is_free(k) ? by[k] / mass[k] : 0.0;
     return by;
   }
   /// J, of the degrees of freedom that forces change.
   DEMBARK_HOT double kinetic() const { return kinetic(velocity); }
-  DEMBARK_HOT double kinetic(const Dofs& v) const {
+  DEMBARK_HOT double kinetic(const SixVector& v) const {
     return 0.5 * dot({mass[0] * v[0], mass[1] * v[1], mass[2] * v[2], mass[3] * v[3], mass[4] * v[4], mass[5] * v[5]}, v);
   }
 };
 
 /// A body and what acts on it in a moment.
 struct EnergyBody : BodyMotion {
-  Dofs force{};              ///< all of it
-  Dofs weight{}, damping{};  ///< what gravity and numerical damping have in that
-  Dofs acceleration{};
+  SixVector force{};              ///< all of it
+  SixVector weight{}, damping{};  ///< what gravity and numerical damping have in that
+  SixVector acceleration{};
 
   /// After the masses.
-  DEMBARK_HOT void set_forces(const Dofs& all, const Dofs& of_gravity, const Dofs& of_damping = {}) {
+  DEMBARK_HOT void set_forces(const SixVector& all, const SixVector& of_gravity, const SixVector& of_damping = {}) {
     force = all;
     weight = of_gravity;
     damping = of_damping;
     acceleration = accelerated(all);
   }
   /// Velocity after a kick of duration h.
-  DEMBARK_HOT Dofs kicked(double h) const {
-    Dofs v = velocity;
+  DEMBARK_HOT SixVector kicked(double h) const {
+    SixVector v = velocity;
     for (std::size_t k = 0; k < v.size(); ++k) v[k] += h * acceleration[k];
     return v;
   }
@@ -71,17 +71,17 @@ struct Powers {
 
   /// Gravity, numerical damping, and all forces together.
   DEMBARK_HOT void add_body(const EnergyBody& body) {
-    const Dofs v = body.part(body.velocity, true);
+    const SixVector v = body.part(body.velocity, true);
     add(gravity, body.weight, v, body.acceleration);
     add(damping, body.damping, v, body.acceleration);
     add(all, body.force, v, body.acceleration);
   }
   /// The last of these alone.
-  DEMBARK_HOT void add_forces(const BodyMotion& body, const Dofs& force) {
+  DEMBARK_HOT void add_forces(const BodyMotion& body, const SixVector& force) {
     add(all, force, body.part(body.velocity, true), body.accelerated(force));
   }
   /// For engines that add up the parts of contacts' forces body by body. Parts that are not `present` are zero.
-  DEMBARK_HOT void add_loads(const EnergyBody& body, const std::array<Dofs, contact_part_count>& loads,
+  DEMBARK_HOT void add_loads(const EnergyBody& body, const std::array<SixVector, contact_part_count>& loads,
                              const std::array<bool, contact_part_count>& present) {
     const bool is_free = body.is_free();
     for (std::size_t part = 0; part < contact_part_count; ++part) {
@@ -101,7 +101,7 @@ struct Powers {
     add_held(one, levers.on_one(whole));
     add_held(two, levers.on_two(whole));
     for (std::size_t part = force_part_count; part < parts.count; ++part) {
-      const Dofs on_one = levers.on_one(part, parts.load[part]), on_two = levers.on_two(part, parts.load[part]);
+      const SixVector on_one = levers.on_one(part, parts.load[part]), on_two = levers.on_two(part, parts.load[part]);
       power[part] += dot(on_one, one.velocity) + dot(on_two, two.velocity);
       add_held(one, on_one);
       add_held(two, on_two);
@@ -109,10 +109,10 @@ struct Powers {
     return dot(parts[ContactPart::normal_elastic], velocity);
   }
   /// What acts on a body as far as that is held: it gives the others what it takes.
-  DEMBARK_HOT void add_held(const BodyMotion& body, const Dofs& load) { power[walls] -= dot(load, body.part(body.velocity, false)); }
+  DEMBARK_HOT void add_held(const BodyMotion& body, const SixVector& load) { power[walls] -= dot(load, body.part(body.velocity, false)); }
 
  private:
-  DEMBARK_HOT void add(std::size_t of, const Dofs& force, const Dofs& velocity, const Dofs& acceleration) {
+  DEMBARK_HOT void add(std::size_t of, const SixVector& force, const SixVector& velocity, const SixVector& acceleration) {
     power[of] += dot(force, velocity);
     rate[of] += dot(force, acceleration);
   }
@@ -166,10 +166,10 @@ struct EnergyLedger {
   }
   /// A body after a kick, with the velocity `after`: its kinetic energy (J). What is not as the forces made it was set by somebody.
   /// The body's own velocity becomes the mean one of the kick.
-  DEMBARK_HOT double arrive(EnergyBody& body, double duration, const Dofs& after) {
+  DEMBARK_HOT double arrive(EnergyBody& body, double duration, const SixVector& after) {
     constexpr double round_off = 1e-13;
-    const Dofs expected = body.kicked(duration);
-    Dofs by_forces = after;
+    const SixVector expected = body.kicked(duration);
+    SixVector by_forces = after;
     bool set = false;
     for (std::size_t k = 0; k < after.size(); ++k) {
       const double momentum = body.mass[k] * std::abs(body.velocity[k]) + duration * (std::abs(body.force[k]) + std::abs(body.weight[k]));

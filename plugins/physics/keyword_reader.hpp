@@ -4,22 +4,19 @@
 
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "message_text.hpp"
+
 namespace dembark::keywords {
 
 [[noreturn]] inline void refuse(const std::string& line) { throw std::invalid_argument(line); }
 
-inline std::string text(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.15g", value);
-  return buffer;
-}
+inline std::string text(double value) { return number_text(value, 15); }
 
 /// `of`: the keyword that they belong to; `what`: what is wanted, for messages.
 class Reader {
@@ -41,13 +38,18 @@ class Reader {
   double number(const std::string& of, const std::string& what) {
     const std::string found = word(of, what);
     double value;
-    if (!is_number(found, value)) refuse(of + ": '" + found + "' is no number; it wants " + what);
+    if (!is_number(found, value)) refuse(of + ": " + what + " must be a number, not '" + found + "'");
     return value;
   }
   double at_least(double lowest, const std::string& of, const std::string& what) {
     const double value = number(of, what);
     if (!(value >= lowest)) refuse(of + ": " + what + " must be >= " + text(lowest) + ", not " + text(value));
     return value;
+  }
+  long integer(const std::string& of, const std::string& what) {
+    const double value = number(of, what);
+    if (value != std::floor(value) || std::abs(value) > 1e9) refuse(of + ": " + what + " must be an integer, not " + text(value));
+    return long(value);
   }
   double positive(const std::string& of, const std::string& what) {
     const double value = number(of, what);

@@ -1,6 +1,7 @@
-// Numbers and names in lines for users.
+// Numbers and names in lines for users, and choices by name.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdio>
 #include <string>
@@ -13,6 +14,14 @@ inline std::string number_text(double value, int digits = 6) {
   char text[32];
   std::snprintf(text, sizeof text, "%.*g", digits, value);
   return text;
+}
+
+/// False, and `option` as it was, for a word that is none of `names`, which stand in the order of the options.
+template <class Option>
+bool option_from_name(const std::vector<std::string>& names, const std::string& word, Option& option) {
+  const auto found = std::find(names.begin(), names.end(), word);
+  if (found != names.end()) option = static_cast<Option>(found - names.begin());
+  return found != names.end();
 }
 
 /// "a, b or c".

@@ -11,18 +11,18 @@
 // 71 (1992) 239; k_t: Mindlin, J. Appl. Mech. 16 (1949) 259.
 //
 // Units SI. delta overlap (m, > 0), v_n relative normal velocity (m/s, > 0 when separating), R* = Ri Rj / (Ri + Rj) (wall: Ri),
-// m* likewise, finite (contact.hpp has two held bodies). In the limit e = 1 both are elastic.
+// m* likewise, finite (contact.hpp has two frozen bodies). In the limit e = 1 both are elastic.
 #pragma once
 
 #include <cmath>
 #include <string>
 #include <vector>
 
+#include "constants.hpp"
 #include "vec3.hpp"  // DEMBARK_HOT
 
 namespace dembark {
 
-constexpr double pi = 3.14159265358979323846;
 constexpr double sqrt_five_sixths = 0.91287092917527685576161630466800355658790782499663875;
 
 enum class NormalLaw { hertz, hooke };
@@ -39,7 +39,7 @@ DEMBARK_FUNCTION inline double effective_shear_modulus(double youngs_1, double p
   return 1.0 / (2.0 * (2.0 - poisson_1) * (1.0 + poisson_1) / youngs_1 + 2.0 * (2.0 - poisson_2) * (1.0 + poisson_2) / youngs_2);
 }
 
-/// R* or m* of two bodies; a partner that is infinite (a wall, or held) leaves the other's value. Infinite if both are.
+/// R* or m* of two bodies; a partner that is infinite (a wall, or frozen) leaves the other's value. Infinite if both are.
 template <class Real, class Truth>
 DEMBARK_HOT Real reduced(Real a, Real b, Truth a_infinite, Truth b_infinite) {
   return select(b_infinite, a, select(a_infinite, b, a * b / (a + b)));

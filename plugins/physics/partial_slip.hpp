@@ -21,8 +21,8 @@
 #include <array>
 #include <cmath>
 
+#include "constants.hpp"
 #include "finnie_rabinowicz.hpp"
-#include "normal_force.hpp"  // pi
 #ifndef DEMBARK_DEVICE
 #include "pack.hpp"
 #endif
@@ -106,7 +106,7 @@ DEMBARK_FUNCTION inline void move_inwards(std::array<double, SlipRings::count>& 
 
 /// The rings of a contact whose radius `a` (m) leaves its first ring: edges move by whole rings. Returns the energy lost (J) per k_t.
 DEMBARK_COLD inline double shift(SlipRings& rings, double a) {
-  const double held = stored_energy(rings, 1.0);
+  const double before = stored_energy(rings, 1.0);
   constexpr int last = SlipRings::count - 1;
   if (!(rings.outer > 0.0)) rings.outer = a;
   while (a > rings.outer) {
@@ -121,13 +121,13 @@ DEMBARK_COLD inline double shift(SlipRings& rings, double a) {
     rings.outer /= SlipRings::ratio;
   }
   for (int i = 0; i <= last; ++i) {  // springs that join are without load
-    const double now = ring_width(rings, i, a), before = ring_width(rings, i, rings.radius);
-    if (!(now > before)) continue;
-    rings.along[i] *= before / now;
-    rings.across[i] *= before / now;
+    const double now = ring_width(rings, i, a), was = ring_width(rings, i, rings.radius);
+    if (!(now > was)) continue;
+    rings.along[i] *= was / now;
+    rings.across[i] *= was / now;
   }
   rings.radius = a;
-  return held - stored_energy(rings, 1.0);
+  return before - stored_energy(rings, 1.0);
 }
 
 /// The rings of a new contact, of one whose normal jumped, or of one whose radius `a` (m) leaves the first ring. Returns the energy lost

@@ -44,7 +44,7 @@ struct RollingResistance {
   DEMBARK_FUNCTION bool on() const { return model != RollingModel::off && friction > 0.0; }
 };
 
-/// I (kg m^2) of two spheres of these masses (kg; infinite = a wall, or held) and radii (m).
+/// I (kg m^2) of two spheres of these masses (kg; infinite = a wall, or frozen) and radii (m).
 DEMBARK_FUNCTION inline double relative_inertia(double mass_1, double radius_1, double mass_2, double radius_2) {
   return reduced(0.4 * mass_1 * radius_1 * radius_1, 0.4 * mass_2 * radius_2 * radius_2);
 }
@@ -59,7 +59,7 @@ struct RollingContact {
   Vec3<double> normal{};              ///< unit, from 2 to 1
   double twist = 0.0;                 ///< rad, see contact_twist()
   double effective_radius = 0.0;      ///< R*, m
-  double inertia = 0.0;               ///< I, kg m^2; infinite between two held bodies
+  double inertia = 0.0;               ///< I, kg m^2; infinite between two frozen bodies
   double normal_force = 0.0;          ///< N, N; negative values count as 0
   double tangential_stiffness = 0.0;  ///< k_t, N/m
   Vec3<double> spin{};                ///< relative spin, rad/s, twisting included
@@ -78,9 +78,9 @@ DEMBARK_FUNCTION inline Vec3<double> rolling_step(const RollingResistance& law, 
   }
   const double stiffness = rolling_stiffness(c.tangential_stiffness, c.effective_radius);
   angle = rotate_to_plane(angle, c.normal, c.twist) + dt * rolling;
-  const double held = stiffness * norm(angle);
-  if (held > most) angle *= most / held;
-  // Two held bodies do not swing: there is nothing to damp.
+  const double elastic = stiffness * norm(angle);
+  if (elastic > most) angle *= most / elastic;
+  // Two frozen bodies do not swing: there is nothing to damp.
   const double damping = std::isinf(c.inertia) ? 0.0 : 2.0 * law.damping_ratio * std::sqrt(3.5 * c.inertia * stiffness);
   const Vec3<double> spring = -stiffness * angle, dashpot = -damping * rolling;
   // The largest part of the dashpot with which the couple keeps the limit: |spring + part dashpot| = most.

@@ -45,9 +45,7 @@ template <class Option>
 Option option_of(const std::string& what, const std::vector<std::string>& names, const std::string& word) {
   Option option{};
   if (option_from_name(names, word, option)) return option;
-  std::string known;
-  for (const std::string& name : names) known += (known.empty() ? "'" : " or '") + name + "'";
-  throw std::invalid_argument(what + " must be " + known + ", not '" + word + "'");
+  throw std::invalid_argument(what + " must be " + names_text(names) + ", not '" + word + "'");
 }
 
 /// Unequal spheres are solved for when they come.

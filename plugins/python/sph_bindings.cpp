@@ -5,7 +5,6 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
@@ -28,11 +27,9 @@ using Rows3 = nb::ndarray<nb::numpy, double, nb::shape<-1, 3>>;
 typedef std::array<double, 3> Three;
 
 int option(const std::string& what, const std::vector<std::string>& names, const std::string& word) {
-  const auto found = std::find(names.begin(), names.end(), word);
-  if (found != names.end()) return int(found - names.begin());
-  std::string known;
-  for (const std::string& name : names) known += (known.empty() ? "'" : " or '") + name + "'";
-  throw std::invalid_argument(what + " must be " + known + ", not '" + word + "'");
+  int found = 0;
+  if (option_from_name(names, word, found)) return found;
+  throw std::invalid_argument(what + " must be " + names_text(names) + ", not '" + word + "'");
 }
 
 Vector vector(const Three& v) { return {v[0], v[1], v[2]}; }

@@ -55,12 +55,11 @@ std::unique_lock<std::mutex> LiquidExchange::open(long step) {
 }
 
 void CapillaryLiquid::postLoad(CapillaryLiquid&) {
-	if (!ledger.share.set_kind(share)) fail("CapillaryLiquid.share is '" + share + "'; it must be cap or fraction");
+	dembark_yade::choose("CapillaryLiquid.share", share, capillary::share_names(), ledger.share.kind);
 	ledger.share.factor = shareFactor;
 	if (const char* wrong = ledger.share.error())
 		fail(std::string("CapillaryLiquid.shareFactor: ") + wrong + ", not " + text(shareFactor));
-	if (!capillary::choose(capillary::return_names(), returnRule, ledger.split))
-		fail("CapillaryLiquid.returnRule is '" + returnRule + "'; it must be equal, radius or taken");
+	dembark_yade::choose("CapillaryLiquid.returnRule", returnRule, capillary::return_names(), ledger.split);
 	if (!(content >= 0.0 && content < 1.0))
 		fail("CapillaryLiquid.content is " + text(content) + "; it must be >= 0 and < 1 (liquid volume over solid volume)");
 	checkVolume("maxBridge", maxBridge);

@@ -100,9 +100,10 @@ using dembark_yade::vec;
 
 namespace {
 
-static_assert(State::DOF_X == 1 && State::DOF_RX == 8 && State::DOF_ALL == 63, "a bit for each degree of freedom, in the order of Dofs");
+static_assert(State::DOF_X == 1 && State::DOF_RX == 8 && State::DOF_ALL == 63,
+              "a bit for each degree of freedom, in the order of SixVector");
 
-::dembark::Dofs dofs(const Vector3r& along, const Vector3r& about) { return ::dembark::dofs(vec(along), vec(about)); }
+::dembark::SixVector sixVector(const Vector3r& along, const Vector3r& about) { return ::dembark::six_vector(vec(along), vec(about)); }
 
 /// What NewtonIntegrator's damping, a share of the acceleration against the mean velocity of the step, adds to an acceleration.
 Vector3r dampingAcceleration(Real share, const Vector3r& acceleration, const Vector3r& velocity, Real dt) {
@@ -197,8 +198,8 @@ void EnergyAccount::recordForces(const Body& body, const NewtonIntegrator& newto
 		fail(bodyName(id) +
 		     " is aspherical and turns by another rule than spheres; block its rotation, or set "
 		     "NewtonIntegrator.exactAsphericalRot to False");
-	moved.velocity = dofs(state.vel, state.angVel);
-	if (moved.mass == ::dembark::Dofs{}) return moved.set_forces({}, {});
+	moved.velocity = sixVector(state.vel, state.angVel);
+	if (moved.mass == ::dembark::SixVector{}) return moved.set_forces({}, {});
 	const Vector3r force = scene->forces.getForce(id), torque = scene->forces.getTorque(id);
 	const Vector3r weight  = state.mass * newton.gravity;
 	Vector3r       damping = Vector3r::Zero(), dampingTorque = Vector3r::Zero();
@@ -209,8 +210,8 @@ void EnergyAccount::recordForces(const Body& body, const NewtonIntegrator& newto
 		damping                = state.mass * dampingAcceleration(newton.damping, acceleration, state.vel, scene->dt);
 		dampingTorque          = state.inertia.cwiseProduct(dampingAcceleration(newton.damping, turning, state.angVel, scene->dt));
 	}
-	moved.set_forces(dofs(force + weight + damping, torque + dampingTorque), dofs(weight, Vector3r::Zero()),
-	                 dofs(damping, dampingTorque));
+	moved.set_forces(sixVector(force + weight + damping, torque + dampingTorque), sixVector(weight, Vector3r::Zero()),
+	                 sixVector(damping, dampingTorque));
 }
 
 /// Takes up the bodies as they are before the step. Returns whether any of them came, left, or is another one than a step ago.
@@ -227,8 +228,8 @@ bool EnergyAccount::recordBodies(const NewtonIntegrator& newton, bool first) {
 		const Body* const body = k < all.size() ? all[k].get() : nullptr;
 		const Real        had  = known[k];
 		if (body) {
-			const bool      moves = newton.mask <= 0 || body->maskCompatible(newton.mask);
-			::dembark::Dofs mass  = dofs(Vector3r::Constant(body->state->mass), body->state->inertia);
+			const bool           moves = newton.mask <= 0 || body->maskCompatible(newton.mask);
+			::dembark::SixVector mass  = sixVector(Vector3r::Constant(body->state->mass), body->state->inertia);
 			for (std::size_t i = 0; i < mass.size(); ++i)
 				if (!moves || body->state->blockedDOFs >> i & 1) mass[i] = 0.0;
 			// After loading nothing is known of a body but its energy.
@@ -332,7 +333,7 @@ void EnergyAccount::tally(const Scene& after) {
 	ledger.kinetic  = 0.0;
 	ledger.now      = {};
 	// A driven wall that turns has got its velocity for its next place.
-	std::vector<const ::dembark::Dofs*> driven;
+	std::vector<const ::dembark::SixVector*> driven;
 	for (const auto& engine : after.engines) {
 		const auto* const motion = dynamic_cast<const WallMotion*>(engine.get());
 		if (!motion || motion->lastStep != recorded) continue;
@@ -345,7 +346,7 @@ void EnergyAccount::tally(const Scene& after) {
 		const Body* const now      = k < all.size() ? all[k].get() : nullptr;
 		EnergyBody&       body     = bodies[k];
 		const auto        velocity = !driven.empty() && driven[k] ? *driven[k]
-		                             : now == present[k]          ? dofs(now->state->vel, now->state->angVel)
+		                             : now == present[k]          ? sixVector(now->state->vel, now->state->angVel)
 		                                                          : body.kicked(length);
 		known[k]                   = ledger.arrive(body, length, velocity);
 		ledger.now.add_body(body);

@@ -15,12 +15,7 @@ namespace yade {
 YADE_PLUGIN((FacetSurface)(Ig2_FacetSurface_Sphere_ScGeom));
 
 using dembark_yade::fail;
-
-namespace {
-
-::dembark::Vec3<double> xyz(const Vector3r& v) { return {v[0], v[1], v[2]}; }
-
-}  // namespace
+using dembark_yade::vec;
 
 boost::python::list FacetSurface::readStl(const std::string& path, Real precision) {
 	try {
@@ -77,7 +72,7 @@ void FacetSurface::refresh() {
 		m.orientation      = state.ori;
 		const Facet& facet = *static_cast<Facet*>(m.body->shape.get());
 		triangles[i].id    = m.id;
-		for (int k = 0; k < 3; ++k) triangles[i].node[k] = xyz(Vector3r(state.pos + state.ori * facet.vertices[k]));
+		for (int k = 0; k < 3; ++k) triangles[i].node[k] = vec(Vector3r(state.pos + state.ori * facet.vertices[k]));
 	}
 	if (moved) surface.update(triangles);
 }
@@ -114,7 +109,7 @@ void FacetSurface::action() {
 		const Sphere* sphere = body ? dynamic_cast<const Sphere*>(body->shape.get()) : nullptr;
 		if (!sphere) continue;
 		const Vector3r centre = body->state->pos + dembark_yade::imageShift(*scene, each->cellDist);
-		const int      now    = surface.follow(facet, xyz(centre), sphere->radius);
+		const int      now    = surface.follow(facet, vec(centre), sphere->radius);
 		if (now != facet && now >= 0) moved.push_back({each, now});
 	}
 	for (const auto& [interaction, facet] : moved) handOver(interaction, facet);
@@ -129,7 +124,7 @@ bool Ig2_FacetSurface_Sphere_ScGeom::go(const shared_ptr<Shape>& shape1, const s
 	const int facet = surface->index(interaction->getId1());
 	if (facet < 0) fail("facet " + std::to_string(interaction->getId1()) + " is not known to FacetSurface; add bodies before it runs");
 	const Real radius = static_cast<Sphere*>(shape2.get())->radius;
-	const auto centre = xyz(Vector3r(state2.pos + shift2));
+	const auto centre = vec(Vector3r(state2.pos + shift2));
 	const auto here   = closest_point(surface->contacts().triangles()[facet], centre);
 	const bool begins = !interaction->isReal() && !force;
 	if (begins && here.distance > radius) return false;

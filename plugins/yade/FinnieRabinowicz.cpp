@@ -27,6 +27,7 @@ YADE_PLUGIN((FinnieRabinowiczPhys)(Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys)(L
 
 static_assert(std::is_same<Real, double>::value, "dembark's laws need a YADE built with REAL_PRECISION_BITS=64");
 
+using dembark_yade::choose;
 using dembark_yade::ContactView;
 using dembark_yade::fail;
 using dembark_yade::text;
@@ -111,15 +112,6 @@ public:
 	}
 	[[noreturn]] void wrong(const std::string& line) const override { fail(line + ", " + pairName(a, b)); }
 };
-
-/// Sets `option` to the one of `names` that an attribute of the law holds.
-template <class Option>
-void choose(const char* attribute, const std::string& word, const std::vector<std::string>& names, Option& option) {
-	if (::dembark::option_from_name(names, word, option)) return;
-	std::string known = names[0];
-	for (std::size_t k = 1; k < names.size(); ++k) known += (names.size() == 2 ? " or " : ", ") + names[k];
-	fail(law2 + attribute + " is '" + word + "'; it must be " + (names.size() == 2 ? "" : "one of ") + known);
-}
 
 }  // namespace
 
@@ -266,12 +258,12 @@ void Law2::postLoad(Law2&) {
 	models.insert(models.begin(), "none");
 	int                       chosen = 0;
 	::dembark::ContactOptions now;
-	choose("normalLaw", normalLaw, ::dembark::normal_law_names(), now.normal_law);
-#define DEMBARK_CHOOSE(name, camel, type, first, names, doc) choose(#camel, camel, ::dembark::names(), now.name);
+	choose(law2 + "normalLaw", normalLaw, ::dembark::normal_law_names(), now.normal_law);
+#define DEMBARK_CHOOSE(name, camel, type, first, names, doc) choose(law2 + #camel, camel, ::dembark::names(), now.name);
 	DEMBARK_CONTACT_CHOICES(DEMBARK_CHOOSE)
 #undef DEMBARK_CHOOSE
-	choose("cohesion", cohesion, ::dembark::cohesion_names(), now.cohesion);
-	choose("capillaryModel", capillaryModel, models, chosen);
+	choose(law2 + "cohesion", cohesion, ::dembark::cohesion_names(), now.cohesion);
+	choose(law2 + "capillaryModel", capillaryModel, models, chosen);
 	const bool dry = now.cohesion != ::dembark::CohesionLaw::none && now.cohesion != ::dembark::CohesionLaw::bridge;
 	if (chosen > 0 && dry) fail(law2 + "capillaryModel is for the cohesion 'bridge', not for '" + cohesion + "'");
 	if (chosen > 0) now.cohesion = ::dembark::CohesionLaw::bridge;

@@ -40,7 +40,7 @@ public:
 		((int,every,20,,"Steps from sample to sample"))
 		((Real,contactSteps,10,,"Fewest steps that the shortest contact shall take"))
 		((string,reaction,"warn",,"What follows when a sample is beyond these limits: 'report', 'warn', 'stop' or 'adapt'"))
-		((long,rows,0,,"With 'adapt': steps of the length that O.dt had at first between two rows, at whose ends O.dt may change"))
+		((long,rows,0,,"With 'adapt': nominal time steps, of the length that O.dt had at first, in an interval; O.dt may change at its end"))
 		((long,impacts,0,,"Every how many a binary impact is integrated anew, among those that begin at a sample; 0 = none. Contacts of :yref:`Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz` without liquid"))
 		((string,saved,"",Attr::hidden,"The tallies, when the scene is saved"))
 		((vector<Real>,histories,,Attr::hidden,"Accelerations of each body by id in the last steps"))
@@ -50,11 +50,11 @@ public:
 		DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES
 		.def("figures",&IntegrationMonitor::figures,"All figures by name.")
 		.def("reset",&IntegrationMonitor::reset,"Forget all that was seen.")
-		.add_property("nextRow",&IntegrationMonitor::nextRow,"With 'adapt': step at which the next row ends")
+		.add_property("nextRow",&IntegrationMonitor::nextRow,"With 'adapt': step at which the present interval ends")
 		.add_property("level",&IntegrationMonitor::level,"With 'adapt': O.dt is what it was at first over 2 to this power")
 	);
 	// clang-format on
-	long nextRow() const { return run.next_row(); }
+	long nextRow() const { return run.interval_end(); }
 	int  level() const { return run.level(); }
 
 private:
@@ -129,7 +129,7 @@ void IntegrationMonitor::action() {
 	// Steps that were not seen, or were of another length, are no history.
 	if (n != step + 1 || scene->dt != run.step()) histories.clear();
 	if (scene->dt != run.step()) run.take_step(scene->dt);
-	if (run.next_row() <= step) run.begin(scene->dt, n);
+	if (run.interval_end() <= step) run.begin(scene->dt, n);
 	step = n;
 	scene->forces.sync();
 	followImpacts(newton);
@@ -160,8 +160,8 @@ void IntegrationMonitor::takeBodies(const NewtonIntegrator& newton) {
 		if (!body || !judged(*body, newton)) continue;
 		const Body::id_t id  = body->getId();
 		const auto&      own = *body->state;
-		const Vector3r  push = scene->forces.getForce(id) / own.mass, turn = scene->forces.getTorque(id).cwiseQuotient(own.inertia);
-		::dembark::Dofs a = ::dembark::dofs(vec(push), vec(turn));
+		const Vector3r push = scene->forces.getForce(id) / own.mass, turn = scene->forces.getTorque(id).cwiseQuotient(own.inertia);
+		::dembark::SixVector a = ::dembark::six_vector(vec(push), vec(turn));
 		for (std::size_t k = 0; k < a.size(); ++k)
 			if (own.blockedDOFs >> k & 1) a[k] = 0.0;
 		Real* const         at = histories.data() + std::size_t(id) * ::dembark::monitor_history_numbers;

@@ -4,16 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include <core/InteractionLoop.hpp>
 #include <core/Scene.hpp>
 #include <pkg/common/Facet.hpp>
 #include <pkg/common/FieldApplier.hpp>
 #include <pkg/common/Sphere.hpp>
 #include <pkg/common/Wall.hpp>
 
+#include "ContactView.hpp"
 #include "CylinderWall.hpp"
 #include "SavedNumbers.hpp"
 #include "engine_access.hpp"
+#include "engine_order.hpp"
 #include "report.hpp"
 
 namespace yade {
@@ -22,14 +23,13 @@ YADE_PLUGIN((LogWall)(LcpImpact)(LogImpact));
 
 using dembark_yade::fail;
 using dembark_yade::text;
+using dembark_yade::vec;
 namespace impact = ::dembark::impact;
 
 namespace lcp_impact {
 
-::dembark::Vec3<double> plain(const Vector3r& v) { return {v[0], v[1], v[2]}; }
-Vector3r                eigen(const ::dembark::Vec3<double>& v) { return Vector3r(v.x, v.y, v.z); }
-constexpr int           unknown = -2;  // plane of the logs
-std::string             logName(Body::id_t id) { return "LcpImpact: log " + std::to_string(id) + " "; }
+constexpr int unknown = -2;  // plane of the logs
+std::string   logName(Body::id_t id) { return "LcpImpact: log " + std::to_string(id) + " "; }
 
 /// Axis of the blocked translation of a log that moves in a plane, -1 of one that moves freely; the rest is refused.
 int blockedAxis(const State& state, Body::id_t id) {
@@ -58,9 +58,7 @@ double inertia(const State& state, int axis, Body::id_t id) {
 
 }  // namespace lcp_impact
 
-using lcp_impact::eigen;
 using lcp_impact::logName;
-using lcp_impact::plain;
 
 std::string LcpImpact::wallName(std::size_t number) const {
 	const std::string& name = wallList[number]->name;
@@ -69,24 +67,17 @@ std::string LcpImpact::wallName(std::size_t number) const {
 
 /// The NewtonIntegrator of the scene; refuses engines in an order or with settings for which the forces would be wrong.
 const NewtonIntegrator& LcpImpact::integrator() const {
+	const NewtonIntegrator& newton = dembark_yade::undampedIntegratorAfter(*this, *scene);
+	if (newton.mask > 0)
+		fail("NewtonIntegrator.mask is " + std::to_string(newton.mask) +
+		     "; it must be -1 with LcpImpact, hold bodies by blockedDOFs");
 	bool after = false;
 	for (const auto& each : scene->engines) {
-		if (each.get() == this) after = true;
-		if (const auto* newton = dynamic_cast<const NewtonIntegrator*>(each.get())) {
-			if (!after) fail("LcpImpact stands after NewtonIntegrator; put it right before it in O.engines");
-			if (newton->damping > 0.0)
-				fail("NewtonIntegrator.damping is " + text(newton->damping) +
-				     "; it must be 0 with LcpImpact, which predicts the motion of the step");
-			if (newton->densityScaling) fail("NewtonIntegrator.densityScaling is on; it must be off with LcpImpact");
-			if (newton->mask > 0)
-				fail("NewtonIntegrator.mask is " + std::to_string(newton->mask) +
-				     "; it must be -1 with LcpImpact, hold bodies by blockedDOFs");
-			return *newton;
-		}
-		if (after && (dynamic_cast<const FieldApplier*>(each.get()) || dynamic_cast<const InteractionLoop*>(each.get())))
+		after = after || each.get() == this;
+		if (after && !each->dead && dynamic_cast<const FieldApplier*>(each.get()))
 			fail(each->getClassName() + " stands after LcpImpact; engines that add forces must stand before it in O.engines");
 	}
-	fail("LcpImpact: O.engines has no NewtonIntegrator after it; add NewtonIntegrator(damping=0)");
+	return newton;
 }
 
 /// A sphere as the model sees it, with YADE's id of its material and without forces.
@@ -100,9 +91,9 @@ impact::Body LcpImpact::logOf(const Body& body) {
 	                 INFINITY,
 	                 static_cast<const Sphere&>(*body.shape).radius,
 	                 body.material ? body.material->id : -1,
-	                 plain(state.pos),
-	                 plain(state.vel),
-	                 plain(state.angVel)};
+	                 vec(state.pos),
+	                 vec(state.vel),
+	                 vec(state.angVel)};
 	if (!body.isDynamic()) return log;
 	if (body.isAspherical()) fail(logName(id) + "is aspherical; set Body.aspherical to False");
 	const int axis = lcp_impact::blockedAxis(state, id);
@@ -132,8 +123,8 @@ void LcpImpact::gatherLogs(const Vector3r& gravity) {
 		if (plane >= 0) force[plane] = 0.0;
 		for (int i = 0; i < 3; ++i)
 			if (body.state->blockedDOFs & State::axisDOF(i, true)) torque[i] = 0.0;
-		log.force  = plain(force);
-		log.torque = plain(torque);
+		log.force  = vec(force);
+		log.torque = vec(torque);
 	};
 	const auto isSphere = [](const shared_ptr<Body>& body) { return body && dynamic_cast<const Sphere*>(body->shape.get()); };
 	if (ids.empty())
@@ -162,20 +153,20 @@ void LcpImpact::addShape(const Body& body, const impact::Wall& wall, std::vector
 	if (body.isDynamic()) fail(where + ": body " + id + " can move freely; hold it by blockedDOFs = 'xyzXYZ'");
 	if (const auto* flat = dynamic_cast<const Wall*>(body.shape.get())) {
 		const Vector3r normal = Vector3r::Unit(flat->axis) * (flat->sense < 0 ? -1.0 : 1.0);
-		around.planes.push_back({wall, plain(state.pos), plain(normal), plain(state.vel), flat->sense == 0});
+		around.planes.push_back({wall, vec(state.pos), vec(normal), vec(state.vel), flat->sense == 0});
 	} else if (const auto* round = dynamic_cast<const CylinderWall*>(body.shape.get())) {
 		const double omega = state.angVel.dot(round->axis);  // its surface moves along itself
 		if (!(round->radius > 0.0)) fail(where + ": CylinderWall.radius of body " + id + " is not set; give it in m");
 		if ((state.angVel - omega * round->axis).norm() > 1e-9 * state.angVel.norm())
 			fail(where + ": body " + id + " turns about another axis than its own; make angVel parallel to CylinderWall.axis");
-		around.drums.push_back({wall, plain(state.pos), plain(round->axis), round->radius, omega, plain(state.vel)});
+		around.drums.push_back({wall, vec(state.pos), vec(round->axis), round->radius, omega, vec(state.vel)});
 	} else if (const auto* facet = dynamic_cast<const Facet*>(body.shape.get())) {
 		::dembark::Triangle triangle;
 		triangle.id = static_cast<std::int64_t>(mesh.size());
 		for (int i = 0; i < 3; ++i) {
 			const Vector3r arm   = state.ori * facet->vertices[i];
-			triangle.node[i]     = plain(Vector3r(state.pos + arm));
-			triangle.velocity[i] = plain(Vector3r(state.vel + state.angVel.cross(arm)));
+			triangle.node[i]     = vec(Vector3r(state.pos + arm));
+			triangle.velocity[i] = vec(Vector3r(state.vel + state.angVel.cross(arm)));
 		}
 		mesh.push_back(triangle);
 	} else {
@@ -218,7 +209,7 @@ void LcpImpact::findContacts(double reach, std::vector<impact::Contact>& contact
 	contacts.erase(std::remove_if(contacts.begin(), contacts.end(), idle), contacts.end());
 	if (plane < 0) return;
 	for (const auto& c : contacts) {
-		if (std::abs(eigen(c.normal)[plane]) <= 1e-9) continue;
+		if (std::abs(vec(c.normal)[plane]) <= 1e-9) continue;
 		const std::string partner = c.b >= 0 ? "log " + std::to_string(c.key_b) : wallName(impact::wall_number(c.key_b));
 		fail(logName(c.key_a) + "meets " + partner + " out of the plane it moves in; put all logs at one " + "xyz"[plane] +
 		     " and walls upright to that plane");
@@ -240,7 +231,6 @@ void LcpImpact::prepare() {
 
 void LcpImpact::action() {
 	dembark_yade::keepThreadState();
-	if (scene->isPeriodic) fail("LcpImpact: the scene is periodic; use an aperiodic one");
 	if (stiffnessRows.empty()) fail("LcpImpact.stiffness is not set; give the stiffness of the logs' boundaries in N/m");
 	const bool first = steps == 0 && velocityAtStart;
 	try {
@@ -257,8 +247,8 @@ void LcpImpact::action() {
 	}
 	if (first) moveBack();
 	for (std::size_t i = 0; i < logs.size(); ++i) {
-		scene->forces.addForce(static_cast<Body::id_t>(logs[i].id), eigen(system->wrenches()[i].force));
-		scene->forces.addTorque(static_cast<Body::id_t>(logs[i].id), eigen(system->wrenches()[i].torque));
+		scene->forces.addForce(static_cast<Body::id_t>(logs[i].id), vec(system->wrenches()[i].force));
+		scene->forces.addTorque(static_cast<Body::id_t>(logs[i].id), vec(system->wrenches()[i].torque));
 	}
 	pushWalls();
 	writeImpacts();
@@ -271,8 +261,8 @@ void LcpImpact::moveBack() const {
 	for (std::size_t i = 0; i < logs.size(); ++i) {
 		if (std::isinf(logs[i].mass)) continue;
 		State&         state = *Body::byId(static_cast<Body::id_t>(logs[i].id), scene)->state;
-		const Vector3r f     = eigen(logs[i].force) + eigen(system->wrenches()[i].force);
-		const Vector3r t     = eigen(logs[i].torque) + eigen(system->wrenches()[i].torque);
+		const Vector3r f     = vec(logs[i].force) + vec(system->wrenches()[i].force);
+		const Vector3r t     = vec(logs[i].torque) + vec(system->wrenches()[i].torque);
 		for (int k = 0; k < 3; ++k) {
 			if (!(state.blockedDOFs & State::axisDOF(k))) state.vel[k] -= 0.5 * scene->dt * f[k] / state.mass;
 			if (!(state.blockedDOFs & State::axisDOF(k, true))) state.angVel[k] -= 0.5 * scene->dt * t[k] / state.inertia[k];
@@ -288,10 +278,10 @@ void LcpImpact::pushWalls() {
 		LogWall&          wall = *wallList[impact::wall_number(contact.key_b)];
 		const std::size_t body = static_cast<std::size_t>(impact::wall_feature(contact.key_b)) / 8;  // of a mesh, the triangle
 		const Body::id_t  id   = wall.bodies[body < wall.bodies.size() ? body : 0];
-		const Vector3r    on   = -(contact.normal_force * eigen(contact.normal) + eigen(contact.tangential));
+		const Vector3r    on   = -(contact.normal_force * vec(contact.normal) + vec(contact.tangential));
 		wall.force += on;
 		scene->forces.addForce(id, on);
-		scene->forces.addTorque(id, (eigen(contact.point) - Body::byId(id, scene)->state->pos).cross(on));
+		scene->forces.addTorque(id, (vec(contact.point) - Body::byId(id, scene)->state->pos).cross(on));
 	}
 }
 
@@ -325,8 +315,8 @@ boost::python::list LcpImpact::contacts() const {
 	boost::python::list result;
 	if (system)
 		for (const auto& c : system->contacts())
-			result.append(boost::python::make_tuple(c.key_a, impact::shown_id(c.key_b), eigen(c.normal), c.gap, c.normal_force,
-			                                        eigen(c.tangential), eigen(c.point)));
+			result.append(boost::python::make_tuple(c.key_a, impact::shown_id(c.key_b), vec(c.normal), c.gap, c.normal_force,
+			                                        vec(c.tangential), vec(c.point)));
 	return result;
 }
 

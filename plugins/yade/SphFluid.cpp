@@ -37,12 +37,6 @@ std::string inYade(const std::string& line) {
 	return "SphFluid: " + out;
 }
 
-int choice(const std::string& name, const std::vector<std::string>& names, const std::string& word) {
-	const auto found = std::find(names.begin(), names.end(), word);
-	if (found == names.end()) fail("SphFluid." + name + " is '" + word + "'; it must be '" + names[0] + "' or '" + names[1] + "'");
-	return static_cast<int>(found - names.begin());
-}
-
 }  // namespace sph_fluid
 
 sph::Settings SphFluid::settings() const {
@@ -54,25 +48,21 @@ sph::Settings SphFluid::settings() const {
 	s.alpha         = alpha;
 	s.delta         = delta;
 	s.gravity       = vec(gravity);
-	s.kernel        = sph::KernelName(sph_fluid::choice("kernel", sph::kernel_names(), kernel));
-	s.boundary      = sph::Boundary(sph_fluid::choice("boundary", sph::boundary_names(), boundary));
 	s.no_slip       = noSlip;
 	s.shifting      = {shifting};
 	s.contact       = {contactStiffness, contactExponent};
 	s.skin          = skin;
 	s.threads       = threads;
 	s.slit_pressure = slitPressure;
+	dembark_yade::choose("SphFluid.kernel", kernel, sph::kernel_names(), s.kernel);
+	dembark_yade::choose("SphFluid.boundary", boundary, sph::boundary_names(), s.boundary);
 	if (const char* const wrong = s.error()) fail(sph_fluid::inYade(wrong));
 	return s;
 }
 
 /// Gravity of the scene; refuses engines in an order or with settings for which momentum would be lost.
 const Vector3r& SphFluid::weight() const {
-	const NewtonIntegrator& newton = dembark_yade::integratorAfter(*this, *scene);
-	if (newton.damping > 0.0)
-		fail("NewtonIntegrator.damping is " + text(newton.damping) + "; it must be 0 with SphFluid, whose forces it would change");
-	if (newton.densityScaling) fail("NewtonIntegrator.densityScaling is on; it must be off with SphFluid");
-	if (scene->isPeriodic) fail("SphFluid: the scene is periodic; use an aperiodic one");
+	const NewtonIntegrator& newton = dembark_yade::undampedIntegratorAfter(*this, *scene);
 	if (substeps < 1) fail("SphFluid.substeps is " + std::to_string(substeps) + "; it must be 1 or more");
 	return newton.gravity;
 }
@@ -198,7 +188,7 @@ void SphFluid::preSave(SphFluid&) {
 	if (solver && passed >= 0) savedState = dembark_yade::encode(solver->state());
 	ways.clear();
 	for (const sph::DrivenMotion& m : motions)
-		for (const sph::Vector& v : {m.way, m.turn, m.velocity, m.spin}) ways.push_back(vec(v));
+		for (const sph::Vector& v : {m.displacement, m.turn, m.velocity, m.spin}) ways.push_back(vec(v));
 }
 
 void SphFluid::postLoad(SphFluid&) {

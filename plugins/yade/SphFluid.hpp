@@ -72,7 +72,7 @@ public:
 		((vector<int>,boxNumbers,,Attr::hidden,"Numbers of the bodies that are boxes"))
 		((vector<Vector3r>,boxEdges,,Attr::hidden,"Their edges [m]"))
 		((vector<Vector3r>,planes,,Attr::hidden,"Point and normal of each plane"))
-		((vector<Vector3r>,ways,,Attr::hidden,"Of each: way and turn since the fluid's last step [m, rad], velocities at its end"))
+		((vector<Vector3r>,ways,,Attr::hidden,"Of each: displacement and turn since the fluid's last step [m, rad], velocities at its end"))
 		((Real,elapsed,0,Attr::hidden,"Since the fluid's last step [s]"))
 		((int,passed,-1,Attr::hidden,"Steps of the scene since the fluid's last one; -1 = it has not begun"))
 		((Real,lastLength,0,Attr::hidden,"Length of the step of the scene before [s]"))

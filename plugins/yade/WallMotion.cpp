@@ -178,7 +178,7 @@ void WallMotion::action() {
 	for (std::size_t k = 0; k < ids.size(); ++k) {
 		State&         body  = state(k);
 		const Vector3r place = to + turn * places[k];
-		next[k]              = ::dembark::dofs(vec(Vector3r(vec(step.velocity) + spin.cross(body.pos - from))), vec(spin));
+		next[k]              = ::dembark::six_vector(vec(Vector3r(vec(step.velocity) + spin.cross(body.pos - from))), vec(spin));
 		body.vel             = vec(step.velocity) + spin.cross(place - to);
 		body.angVel          = spin;
 		// NewtonIntegrator goes on from here to the place at the end of the step. A chord is no tangent, and sums would round.

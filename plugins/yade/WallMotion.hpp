@@ -24,7 +24,7 @@ public:
 	void measure();
 	/// Velocity of a body (by its place in ids) in the half step after `lastStep`, with the wall where it was in that step: what mean
 	/// velocities are made with. A body that turns has another one when it has come to its next place.
-	const ::dembark::Dofs& after(std::size_t k) const { return next[k]; }
+	const ::dembark::SixVector& after(std::size_t k) const { return next[k]; }
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(WallMotion,GlobalEngine,"Moves held bodies (facets, boxes, walls, spheres) together by a prescribed motion: a sum of terms whose place, velocity and acceleration are known at any time, and which no force changes. Stands after :yref:`InteractionLoop` and :yref:`EnergyAccount`, and before :yref:`NewtonIntegrator`. Contact laws see [x(n) - x(n-1)] / dt, the velocity of the half step of which the grains' velocities are. Attributes hold the motion and what the bodies do to the others at the step that measure() or the last step took.",
 		((std::vector<int>,ids,,,"Bodies that move"))
@@ -67,8 +67,8 @@ private:
 	State& state(std::size_t k) const;
 	void   refer(const ::dembark::WallState&);
 
-	::dembark::PrescribedMotion  prescribed;
-	std::vector<::dembark::Dofs> next;
+	::dembark::PrescribedMotion       prescribed;
+	std::vector<::dembark::SixVector> next;
 };
 REGISTER_SERIALIZABLE(WallMotion);
 

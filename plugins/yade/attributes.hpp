@@ -12,5 +12,5 @@ void setAttribute(const boost::python::object& self, const boost::python::object
 
 }  // namespace yade::dembark_yade
 
-/// Stands first among the Python definitions of each class.
+/// Among the Python definitions of each class; a derived class inherits it.
 #define DEMBARK_REFUSES_UNKNOWN_ATTRIBUTES .def("__setattr__", &::yade::dembark_yade::setAttribute)

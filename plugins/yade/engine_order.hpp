@@ -1,6 +1,8 @@
 // Where an engine that looks at the forces of a step has to stand among the engines of its scene.
 #pragma once
 
+#include <string>
+
 #include <core/GlobalEngine.hpp>
 #include <core/InteractionLoop.hpp>
 #include <core/Scene.hpp>
@@ -26,6 +28,16 @@ inline const NewtonIntegrator& integratorAfter(const Engine& own, const Scene& s
 	}
 	if (!found) refuse(": there is no NewtonIntegrator in O.engines; it needs exactly one after it");
 	return *found;
+}
+
+/// The same of an engine whose forces need an integrator that adds none and bodies that have their own masses, without periodic images.
+inline const NewtonIntegrator& undampedIntegratorAfter(const Engine& own, const Scene& scene) {
+	const NewtonIntegrator& found = integratorAfter(own, scene);
+	const std::string       name  = own.getClassName();
+	if (found.damping > 0.0) fail("NewtonIntegrator.damping is " + text(found.damping) + "; it must be 0 with " + name);
+	if (found.densityScaling) fail("NewtonIntegrator.densityScaling is on; it must be off with " + name);
+	if (scene.isPeriodic) fail(name + ": the scene is periodic; use an aperiodic one");
+	return found;
 }
 
 }  // namespace yade::dembark_yade

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstdio>
 #include <cstdlib>
 #include <iostream>
 #include <mutex>
@@ -112,11 +111,5 @@ void postpone(Scene& scene, const std::exception& error, bool inCollider) {
 }
 
 bool postponed(const Scene& scene) { return waiting && raises(scene); }
-
-std::string text(double value) {
-	char buffer[32];
-	std::snprintf(buffer, sizeof buffer, "%.6g", value);
-	return buffer;
-}
 
 }  // namespace yade::dembark_yade

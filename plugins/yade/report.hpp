@@ -3,6 +3,9 @@
 
 #include <stdexcept>
 #include <string>
+#include <vector>
+
+#include "dembark/message_text.hpp"
 
 struct _object;  // PyObject
 
@@ -26,8 +29,15 @@ void postpone(Scene& scene, const std::exception& error, bool inCollider = false
 /// Whether that is still to come: then nothing in the loop counts any more.
 bool postponed(const Scene& scene);
 
-/// Shortest of the usual forms of a number, for such lines.
-std::string text(double value);
+/// A number in such lines.
+inline std::string text(double value) { return ::dembark::number_text(value); }
+
+/// Sets `option` to the one of `names` that an attribute holds; fails with one line for another word.
+template <class Option>
+void choose(const std::string& attribute, const std::string& word, const std::vector<std::string>& names, Option& option) {
+	if (!::dembark::option_from_name(names, word, option))
+		fail(attribute + " is '" + word + "'; it must be " + ::dembark::names_text(names));
+}
 
 }  // namespace dembark_yade
 

@@ -138,8 +138,8 @@ def test_a_resumed_run_has_the_same_figures_to_the_bit(tmp_path: Path, ranks: in
 
 
 @pytest.mark.parametrize(("words", "told"), [
-    ("", "it needs 'speed'"), ("speed fast", "after speed there must be a number, not 'fast'"),
-    ("speed 1 every 2.5", "every must be a whole number of steps, not '2.5'"),
+    ("", "it needs 'speed'"), ("speed fast", "speed: the value must be a number, not 'fast'"),
+    ("speed 1 every 2.5", "every: the value must be an integer, not 2.5"),
     ("speed 1 action adapt", "action 'adapt' needs 'rows'"), ("speed 1 sped 2", "keyword 'sped' is unknown; it can be speed, length"),
     ("speed 1\nfix more all integration/monitor speed 1", "there can be one such fix only, and there is fix watch"),
     ("speed 1\nfix plate all wall/gran hooke/history 1e4 NULL 10 NULL 0.5 0 zplane 0 NULL", "and there is fix plate (wall/gran)"),

@@ -223,7 +223,7 @@ def test_largest_bridge(tmp_path):
 
 @pytest.mark.parametrize(("change", "told"), [
     ({"liquid": "content -1"}, "content (liquid volume over grain volume) must be >= 0"),
-    ({"liquid": "content nan"}, "content 'nan' is not a number"),
+    ({"liquid": "content nan"}, "content: the value must be a number, not 'nan'"),
     ({"liquid": "content 0.01 volume 1e-12"}, "either content or volume"),
     ({"liquid": "share cap 3"}, "must lie in (0, 2]"),
     ({"liquid": "share all"}, "cap or fraction"),

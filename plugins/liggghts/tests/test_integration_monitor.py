@@ -175,13 +175,13 @@ run {round(2.4e-3 / step)}""")
 
 
 @pytest.mark.parametrize(("words", "told"), [
-    ("", "it needs 'speed'"), ("speed", "after speed there must be a number"),
-    ("speed fast", "after speed there must be a number, not 'fast'"), ("speed 0", "it needs 'speed'"),
+    ("", "it needs 'speed'"), ("speed", "speed: the value is missing"),
+    ("speed fast", "speed: the value must be a number, not 'fast'"), ("speed 0", "it needs 'speed'"),
     ("speed -1", "speed (m/s) must be a number > 0"), ("speed 1 length 0", "length (m) must be a number > 0"),
     ("speed 1 limit 0", "limit must be > 0"), ("speed 1 every 0", "every must be 1 step or more"),
-    ("speed 1 every 2.5", "every must be a whole number of steps, not '2.5'"),
+    ("speed 1 every 2.5", "every: the value must be an integer, not 2.5"),
     ("speed 1 contact_steps 0", "contact_steps must be a number > 0"),
-    ("speed 1 action shout", "action 'shout' is unknown; it can be report, warn, stop, adapt"),
+    ("speed 1 action shout", "action 'shout' is unknown; it can be report, warn, stop or adapt"),
     ("speed 1 action adapt", "action 'adapt' needs 'rows'"), ("speed 1 rows 5", "rows belongs to action adapt"),
     ("speed 1 sped 2", "keyword 'sped' is unknown; it can be speed, length"), ("speed 1 impacts -1", "impacts must be 0 (none) or more"),
     ("speed 1\nfix more all integration/monitor speed 1", "there can be one such fix only, and there is fix watch"),

@@ -130,7 +130,7 @@ def refused(folder, words="stiffness 1e7", **settings):
     ("stiffness 1e7 2e7", "stiffness: one value (N/m) for each of the 1 atom types, not 2"),
     ("stiffness -1", "stiffness: the value (N/m) of type 1 must be > 0, not -1"),
     ("stiffness 1e7 damping -2", "damping: the value (N s/m) of type 1 must be >= 0, not -2"),
-    ("stiffness 1e7 contact_damping high", "contact_damping: 'high' is no number"),
+    ("stiffness 1e7 contact_damping high", "contact_damping: the value (N s/m) must be a number, not 'high'"),
     ("stiffness 1e7 theta 0.4", "theta: the value lies in 0.5...1, not 0.4"),
     ("stiffness 1e7 friction 0.2 0.3 1e-5", "kinetic friction 0.3 must not exceed static friction 0.2"),
     ("stiffness 1e7 friction 0.3 0.2", "critical slip distance"),

@@ -186,7 +186,7 @@ REFUSED = {
     "step": ("stiffness 2e4", "stiffness 2e7", "the time step must be at most"),
     "share": ("friction 0.4 ", "slit_pressure 2 friction 0.4 ", "slit_pressure must be between 0 and 1"),
     "edge": ("box two 0.06 0.06 0.06", "box two 0.06 0.06 0.05 slit_pressure 1",
-             "box two has an edge of 0.05 m; it must be a whole number of the spacing, 0.02 m"),
+             "box two: an edge of 0.05 m must be an integer multiple of the spacing, 0.02 m"),
     "lattice": ("box two 0.06 0.06 0.06", "box two 0.06 0.06 0.08 slit_pressure 1",
                 "the particles of box two must be the lattice that fills it, 36 of them; of its 27, 0 are on that lattice"),
 }

@@ -106,7 +106,7 @@ REFUSED = {
     "keyword": ("sound_speed 30.0 ", "sound_speed 30.0 wavy 3", "'wavy' is no keyword; known are spacing"),
     "spacing": ("spacing 0.02", "", "spacing (m) is missing"),
     "sound": ("sound_speed 30.0", "", "sound_speed (m/s) is missing"),
-    "number": ("spacing 0.02", "spacing wide", "'wide' is no number; it wants dx (m)"),
+    "number": ("spacing 0.02", "spacing wide", "dx (m) must be a number, not 'wide'"),
     "kernel": ("sound_speed 30.0 ", "sound_speed 30.0 kernel gauss", "the kernel is one of wendland_c2, cubic_spline, not 'gauss'"),
     "empty body": ("fix body3 g3", "group none type 99\nfix body3 none", "its group has no atoms"),
     "no mass": ("mass 6.4 ", "", "mass is missing"),

@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "../constants.hpp"
 #include "bridge_table.hpp"
 #include "closed_forms.hpp"
 #include "liquid.hpp"
@@ -33,7 +34,7 @@ enum class Model { exact, willett, willett_full, rabinovich, bagheri, constant }
 inline std::vector<std::string> model_names() { return {"exact", "willett", "willett_full", "rabinovich", "bagheri", "constant"}; }
 
 /// False, and `model` as it was, for a name that is none of model_names().
-inline bool model_from_name(const char* name, Model& model) { return name && choose(model_names(), name, model); }
+inline bool model_from_name(const char* name, Model& model) { return name && option_from_name(model_names(), name, model); }
 
 /// Evaluates the force law of one model and one contact angle: a plain value that may be copied to a device. BridgeLaw (bridge_law.hpp)
 /// makes it and owns what `tables` points to.
@@ -104,7 +105,7 @@ class BridgeForce {
       case Model::willett_full: return regression_.force(gap, v);
       case Model::rabinovich: return rabinovich_force(gap, v, sine_, cosine_);
       case Model::bagheri: return fit_.force(gap, v);
-      default: return 6.283185307179586477 * cosine_;
+      default: return two_pi * cosine_;
     }
   }
 };

@@ -161,7 +161,7 @@ class BridgeLaw : public BridgeForce {
   std::optional<ExactBridge> exact_;
 
   static double checked(double contact_angle) {
-    if (contact_angle >= 0.0 && contact_angle <= 0.5 * detail::pi * (1.0 + 1e-12)) return contact_angle;
+    if (contact_angle >= 0.0 && contact_angle <= 0.5 * pi * (1.0 + 1e-12)) return contact_angle;
     char line[128];
     std::snprintf(line, sizeof line, "contact angle %g rad: it must lie in 0...pi/2 (1.5708)", contact_angle);
     throw std::invalid_argument(line);

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../constants.hpp"
 #include "../vec3.hpp"  // DEMBARK_FUNCTION
 
 namespace dembark::capillary {
@@ -32,7 +33,7 @@ template <class Real>
 DEMBARK_FUNCTION inline Real willett_force(Real gap, Real v, Real cosine) {
   using std::sqrt;
   const Real scaled = gap / sqrt(v);
-  return Real(6.283185307179586477) * cosine / (Real(1) + scaled * (Real(1.05) + Real(2.5) * scaled));
+  return Real(two_pi) * cosine / (Real(1) + scaled * (Real(1.05) + Real(2.5) * scaled));
 }
 
 /// Rabinovich, Esayanur & Moudgil, Langmuir 21 (2005) 10992, eqs. 19-20: 2 pi [cos(theta) / (1 + s/(2 d)) + sin(alpha) sin(alpha + theta)].
@@ -47,7 +48,7 @@ DEMBARK_FUNCTION inline Real rabinovich_force(Real gap, Real v, Real sine, Real 
   // The immersion angle of a flat approximation; a hemisphere is the most that it can mean.
   const Real alpha = std::min(sqrt(a / sum), Real(1.57079632679489661923));
   const Real s = sin(alpha), c = cos(alpha);
-  return Real(6.283185307179586477) * (cosine / (Real(1) + gap * sum / a) + s * (s * cosine + c * sine));
+  return Real(two_pi) * (cosine / (Real(1) + gap * sum / a) + s * (s * cosine + c * sine));
 }
 
 /// Regression of Willett et al. (2000), appendix: 2 pi exp(f1 - f2 exp(f3 ln S + f4 ln^2 S)), S = (s/2) / sqrt(v).
@@ -67,13 +68,13 @@ class WillettRegression {
   DEMBARK_FUNCTION double force(double gap, double v) const {
     const double l = std::log(std::clamp(v, 1e-6, 0.1));
     const double f1 = at(f1_, l);
-    if (!(gap > 0.0)) return 6.283185307179586477 * std::exp(f1);
+    if (!(gap > 0.0)) return two_pi * std::exp(f1);
     const double f2 = std::max(at(f2_, l), 0.0), f3 = at(f3_, l), f4 = std::min(at(f4_, l), 0.0);
     double x = std::log(0.5 * gap / std::sqrt(v));
     // The parabola has its top near rupture; past it the fit would make the force rise with the gap.
     if (2.0 * f4 * x < -f3) x = -0.5 * f3 / f4;
     const double exponent = (f3 + f4 * x) * x;
-    return 6.283185307179586477 * std::exp(f1 - f2 * std::exp(exponent));
+    return two_pi * std::exp(f1 - f2 * std::exp(exponent));
   }
 
  private:
@@ -93,7 +94,7 @@ class BagheriFit {
     const double s = gap / willett_rupture(v, theta_);
     const double l = std::log(std::clamp(v, 1e-9, 1.0));
     const auto power = [l](double n) { return std::exp(n * l); };
-    const double dry = 6.283185307179586477 * (1.0 - 0.3823 * power(0.2586));
+    const double dry = two_pi * (1.0 - 0.3823 * power(0.2586));
     const double a = 0.4158 * power(0.2835) + 0.6474, b = -0.2087 * power(0.3113) + 2.267;
     const double touching = std::max(1.0 - a * std::pow(sine_, b), 0.0) * dry;
     const double as = -0.3319 * power(0.4974) + 0.6717 * power(0.1995);

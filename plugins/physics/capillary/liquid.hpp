@@ -20,15 +20,9 @@
 #include <tuple>
 #include <vector>
 
-namespace dembark::capillary {
+#include "../message_text.hpp"
 
-/// Whether `name` is one of `names`, which stand in the order of an enumeration; it then is `value`.
-template <class Enumeration>
-inline bool choose(const std::vector<std::string>& names, const std::string& name, Enumeration& value) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found != names.end()) value = static_cast<Enumeration>(found - names.begin());
-  return found != names.end();
-}
+namespace dembark::capillary {
 
 /// Radius of a wall in the functions below.
 template <class Real>
@@ -54,7 +48,7 @@ struct ShareRule {
   double factor = 1.0;  // c above: 0...2 of the cap, 0...1 as a fraction
 
   /// Whether there is a kind of that name, which then holds.
-  bool set_kind(const std::string& name) { return choose(share_names(), name, kind); }
+  bool set_kind(const std::string& name) { return option_from_name(share_names(), name, kind); }
   /// Nullptr, or what is wrong.
   const char* error() const {
     if (kind == Kind::cap) return factor > 0.0 && factor <= 2.0 ? nullptr : "the factor of the facing cap must lie in (0, 2]";

@@ -175,21 +175,21 @@ class LiquidLedger {
   /// all of them. What vanished goes back to each side. Returns a grain whose bridges hold `excess` more than it gave, or -1.
   template <class EachBridge>
   int reconcile_pairs(GrainLiquid grains, EachBridge each, double& excess) {
-    std::vector<double> held(std::size_t(grains.owned), 0.0);
+    std::vector<double> in_bridges(std::size_t(grains.owned), 0.0);
     each([&](int i, int j, double volume, double imbalance) {
-      held[i] += returned(volume, imbalance);
-      if (j < grains.owned) held[j] += returned(volume, -imbalance);
+      in_bridges[i] += returned(volume, imbalance);
+      if (j < grains.owned) in_bridges[j] += returned(volume, -imbalance);
     });
     for (int i = 0; i < grains.owned; ++i) {
       double& tallied = of_pairs_[i];
-      const double back = tallied - held[i], noise = rounding * std::max(tallied, grains.volume[i]);
+      const double back = tallied - in_bridges[i], noise = rounding * std::max(tallied, grains.volume[i]);
       if (back < -noise) {
-        excess = -back / held[i];
+        excess = -back / in_bridges[i];
         return i;
       }
       if (back <= noise) continue;
       grains.volume[i] += back;
-      tallied = held[i];
+      tallied = in_bridges[i];
     }
     return -1;
   }
@@ -204,18 +204,18 @@ class LiquidLedger {
         double &of_grain = walls[w].of_grain[i], &own = walls[w].own[i];
         if (of_grain == 0.0 && own == 0.0) continue;
         const double tallied = of_grain + own;
-        double held = 0.0;
-        each(i, w, [&](double& volume, double&) { held += volume; });
-        if (held > 0.0 && std::abs(tallied - held) <= rounding * held) continue;
-        if (held > 0.0 && held > tallied) {
-          const double scale = std::max(tallied, 0.0) / held;
+        double in_bridges = 0.0;
+        each(i, w, [&](double& volume, double&) { in_bridges += volume; });
+        if (in_bridges > 0.0 && std::abs(tallied - in_bridges) <= rounding * in_bridges) continue;
+        if (in_bridges > 0.0 && in_bridges > tallied) {
+          const double scale = std::max(tallied, 0.0) / in_bridges;
           each(i, w, [&](double& volume, double& imbalance) {
             volume *= scale;
             imbalance *= scale;
           });
           continue;
         }
-        const double kept = held > 0.0 ? held / tallied : 0.0;
+        const double kept = in_bridges > 0.0 ? in_bridges / tallied : 0.0;
         grains.volume[i] = remaining(grains.volume[i], -(1.0 - kept) * of_grain);
         walls[w].change += (1.0 - kept) * own;
         of_grain *= kept;
@@ -244,7 +244,8 @@ class LiquidLedger {
   }
 
   /// Compares what is there with what should be. Less is lost if there are fewer grains than before; else it was changed from outside,
-  /// or, within a run, something is wrong: then the missing part of it is returned, otherwise 0. Collective.
+  /// or, within a run, something is wrong: then returns the fraction that is missing, negative where there is too much, otherwise 0.
+  /// Collective.
   double audit(GrainLiquid grains, bool in_run) {
     const Totals there = totals(grains);
     const double now = there.held(), missing = expected - now;

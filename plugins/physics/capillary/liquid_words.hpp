@@ -23,29 +23,22 @@ inline GrainContent read_liquid(const std::vector<std::string>& words, const std
   using keywords::refuse;
   keywords::Reader in(words);
   GrainContent grains;
-  const auto number = [&in](const std::string& what) {
-    double value;
-    if (!in.left()) refuse(what + " is missing");
-    const std::string word = in.word(what, what);
-    if (!keywords::Reader::is_number(word, value)) refuse(what + " '" + word + "' is not a number");
-    return value;
-  };
   const auto name = [&in] { return in.left() ? in.word("", "") : std::string(); };
   while (in.left()) {
     const std::string word = name();
     if (word == "content" || word == "volume") {
       if (grains.content > 0.0 || grains.volume >= 0.0) refuse("the liquid of a grain is given once: either content or volume");
       double& value = word == "content" ? grains.content : grains.volume;
-      value = number(word);
+      value = in.number(word, "the value");
       if (!(value >= 0.0)) refuse(word + (word == "content" ? " (liquid volume over grain volume)" : " (m^3 a grain)") + " must be >= 0");
     } else if (word == "share") {
-      if (!ledger.share.set_kind(name())) refuse("share must be followed by cap or fraction");
-      ledger.share.factor = number("the number of share");
+      if (!ledger.share.set_kind(name())) refuse("share must be followed by " + names_text(share_names()));
+      ledger.share.factor = in.number(word, "the factor");
       if (const char* const wrong = ledger.share.error()) refuse(wrong);
     } else if (word == "return") {
-      if (!choose(return_names(), name(), ledger.split)) refuse("return must be followed by equal, radius or taken");
+      if (!option_from_name(return_names(), name(), ledger.split)) refuse("return must be followed by " + names_text(return_names()));
     } else if (word == "max_bridge") {
-      ledger.largest_bridge = number(word);
+      ledger.largest_bridge = in.number(word, "the value");
       if (!(ledger.largest_bridge > 0.0)) refuse("max_bridge (m^3) must be > 0");
     } else if (word == "wall") {
       if (in.count_left() < 4)
@@ -53,9 +46,9 @@ inline GrainContent read_liquid(const std::vector<std::string>& words, const std
       LiquidWall wall;
       wall.name = name();
       if (ledger.wall(wall.name)) refuse("wall " + wall.name + " is given twice");
-      wall.pool = number("the liquid of the wall");
-      wall.share = number("the share of the wall");
-      wall.part = number("the part of the wall");
+      wall.pool = in.number("wall " + wall.name, "its liquid");
+      wall.share = in.number("wall " + wall.name, "its share");
+      wall.part = in.number("wall " + wall.name, "its part");
       if (const char* const wrong = wall.error()) refuse("wall " + wall.name + ": " + wrong);
       ledger.walls.push_back(wall);
     } else refuse("keyword '" + word + "' is unknown; there are content, volume, share, return, max_bridge, wall");

@@ -18,13 +18,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../constants.hpp"
 #include "../vec3.hpp"  // DEMBARK_FUNCTION
 
 namespace dembark::capillary {
-
-namespace detail {
-constexpr double three_pi = 9.42477796076937971539;
-}
 
 struct ViscousLiquid {
   double viscosity = 0.0;    ///< Pa s; 0 = no viscous force
@@ -46,17 +43,17 @@ DEMBARK_FUNCTION inline ViscousResistance<Real> viscous_resistance(const Viscous
   using std::sqrt;
   if (!liquid.on() || !(volume > Real(0))) return {};
   const Real s = std::max(gap, Real(liquid.minimum_gap));
-  const Real a = Real(6) * volume / (Real(detail::three_pi) * radius), edge = sqrt(s * s + a);
+  const Real a = Real(6) * volume / (Real(three_pi) * radius), edge = sqrt(s * s + a);
   const Real x = a / (edge * (edge + s));  // 1 - s/edge without its cancellation
   const Real shape = Real(8.0 / 15.0) * log(Real(0.5) * radius / s) + Real(0.9588);
-  return {Real(0.5 * detail::three_pi * liquid.viscosity) * radius * radius * x * x / s,
-          Real(detail::three_pi * liquid.viscosity) * radius * std::max(shape, Real(0))};
+  return {Real(0.5 * three_pi * liquid.viscosity) * radius * radius * x * x / s,
+          Real(three_pi * liquid.viscosity) * radius * std::max(shape, Real(0))};
 }
 
 /// Largest time step (s) of an explicit integration of a pair of `effective_mass` (kg): beyond it the normal force at the smallest gap
 /// would turn the motion round within a step, and feed it.
 DEMBARK_FUNCTION inline double viscous_time_step(const ViscousLiquid& liquid, double radius, double effective_mass) {
-  return effective_mass * liquid.minimum_gap / (0.5 * detail::three_pi * liquid.viscosity * radius * radius);
+  return effective_mass * liquid.minimum_gap / (0.5 * three_pi * liquid.viscosity * radius * radius);
 }
 
 }  // namespace dembark::capillary

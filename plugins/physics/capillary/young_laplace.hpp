@@ -10,6 +10,8 @@
 #include <array>
 #include <cmath>
 
+#include "../constants.hpp"
+
 namespace dembark::capillary {
 
 /// What fixes a bridge; ratios and logarithms, so that sizes of any magnitude are alike.
@@ -37,8 +39,6 @@ struct BridgeShape {
 };
 
 namespace detail {
-
-constexpr double pi = 3.14159265358979323846;
 
 /// Positive half of the Gauss-Legendre rule with 2 n points.
 template <int n>
@@ -99,7 +99,7 @@ class UnequalSpheres {
   BridgeShape shape(const BridgeCoordinates& x) const {
     static const detail::EvenGauss<half> rule;
     const double b1 = near_ * std::exp(x[0]), length = std::exp(x[2]), k = x[1], p = k / length;
-    if (!(b1 < detail::pi)) return {};
+    if (!(b1 < pi)) return {};
     const double r1 = std::sin(b1) / near_, rise1 = r1 * std::sin(b1 + theta_), run1 = -r1 * std::cos(b1 + theta_);
     const double spread = 1.0 - p * rise1;
     double height = 0.0, revolved = 0.0, area = 0.0;
@@ -122,9 +122,9 @@ class UnequalSpheres {
     b.miss = (std::sin(b2) - far_ * r2) / b1;
     b.caps = cap1.height + cap2.height;
     b.gap = 0.5 * length * height - b.caps;
-    b.volume = 0.5 * detail::pi * length * revolved - cap1.volume - cap2.volume;
-    b.force = 2.0 * detail::pi * (rise1 - 0.5 * p * r1 * r1);
-    b.energy = detail::pi * length * area - std::cos(theta_) * (cap1.area + cap2.area);
+    b.volume = 0.5 * pi * length * revolved - cap1.volume - cap2.volume;
+    b.force = 2.0 * pi * (rise1 - 0.5 * p * r1 * r1);
+    b.energy = pi * length * area - std::cos(theta_) * (cap1.area + cap2.area);
     b.half_filling_angle = b1;
     b.pressure = p;
     b.valid = b.volume > 0.0 && b.caps + b.gap > 0.0;
@@ -180,8 +180,8 @@ class EqualSpheres {
 
   /// Start of the touching bridge of a small volume: the ring between osculating paraboloids.
   BridgeCoordinates small_touching(double volume) const {
-    const double beta = std::pow(2.0 * volume / detail::pi, 0.25);
-    const double span = 0.5 * detail::pi - contact_angle() - beta;
+    const double beta = std::pow(2.0 * volume / pi, 0.25);
+    const double span = 0.5 * pi - contact_angle() - beta;
     const double arc = 0.5 * beta * beta / detail::sinc(span);
     const double neck = beta - 0.5 * span * arc;
     return {0.0, arc / neck - span, std::log(neck / arc)};

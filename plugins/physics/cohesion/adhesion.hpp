@@ -21,16 +21,14 @@
 
 #include <cmath>
 
-#include "../normal_force.hpp"  // pi, reduced()
+#include "../constants.hpp"
+#include "../normal_force.hpp"  // reduced()
 
 namespace dembark {
 
-/// Pull-off forces (N).
+/// Pull-off force (N).
 DEMBARK_FUNCTION inline double dmt_pull_off(double work_of_adhesion, double effective_radius) {
   return 2.0 * pi * work_of_adhesion * effective_radius;
-}
-DEMBARK_FUNCTION inline double jkr_pull_off(double work_of_adhesion, double effective_radius) {
-  return 1.5 * pi * work_of_adhesion * effective_radius;
 }
 
 /// The gap (m, > 0) beyond which a JKR contact breaks, equation (3).

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "../constants.hpp"
 #include "../finnie_rabinowicz.hpp"
 #include "assembly.hpp"
 #include "history.hpp"
@@ -26,7 +27,7 @@ namespace impact {
 /// Area (m^2) that the interface's shear strength counts on: as given, or the circle pi R* N / s of the springs' approach N / s.
 inline double friction_area(const Row& row, double normal_force) {
   if (row.law->contact_area > 0.0) return row.law->contact_area;
-  return 3.14159265358979323846 * row.radius * normal_force / row.stiffness;
+  return pi * row.radius * normal_force / row.stiffness;
 }
 
 /// One sweep of one contact.

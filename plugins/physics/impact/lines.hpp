@@ -71,7 +71,7 @@ class Lines {
     for (std::size_t i = near_; i < lines_.size(); ++i) z[lines_[i].row] = 0.0;
   }
 
-  /// So many lines, the first, may carry a force and are swept over.
+  /// The first near() lines may carry a force; sweeps take these only.
   Eigen::Index near() const { return Eigen::Index(near_); }
   double unit(Eigen::Index i) const { return lines_[std::size_t(i)].root; }
   double force(Eigen::Index i) const { return relaxation_[std::size_t(i)].z; }

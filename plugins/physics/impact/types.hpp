@@ -76,7 +76,7 @@ struct Contact {
   double wall_stiffness = std::numeric_limits<double>::infinity();  ///< walls: s_w, N/m
 };
 
-/// Gaps are looked at that the free motion times this closes, for forces of other contacts close gaps as well.
+/// Candidates are gaps that the free motion of a step, times this factor, closes: forces of other contacts close gaps, too.
 constexpr double reach_factor = 2.0;
 
 /// By how much the square of a unit normal may differ from 1.

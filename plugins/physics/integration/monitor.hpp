@@ -13,13 +13,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
-#include "../normal_force.hpp"  // pi
+#include "../constants.hpp"
+#include "../message_text.hpp"
 #include "step_error.hpp"
 
 namespace dembark {
@@ -29,7 +29,7 @@ enum class MonitorAction {
   report,  ///< nothing: numbers only
   warn,    ///< one line, for each kind of finding once
   stop,    ///< the run ends with that line
-  adapt,   ///< the step is halved at the next row, and doubled again when that is well within the limits
+  adapt,   ///< the step is halved after an interval beyond the limits, and doubled again after one that is well within them
 };
 /// Their names, in their order.
 inline std::vector<std::string> monitor_action_names() { return {"report", "warn", "stop", "adapt"}; }
@@ -93,31 +93,31 @@ struct MonitorTally {
   auto fields() { return std::tie(errors, contact, impacts); }
 };
 
-/// The sums of a whole run, and those since the last row, at which `adapt` acts.
+/// The sums of a run, and those of the present interval, at whose end `adapt` acts.
 class StepMonitor {
  public:
   MonitorSettings settings{};
-  MonitorTally run{}, row{};
+  MonitorTally run{}, interval{};
 
   /// Takes the accelerations of a body (m/s^2, then rad/s^2) at the end of step n of h (s), for which settings.keeps(n) holds.
-  void take(AccelerationHistory& history, const Dofs& accelerations, double radius, long id, long n, double h) {
+  void take(AccelerationHistory& history, const SixVector& accelerations, double radius, long id, long n, double h) {
     if (settings.begins(n)) history.forget();
     LocalError e;
-    if (history.step(accelerations, h, e) && settings.samples(n)) row.errors.add(e, radius, id, settings.scales);
+    if (history.step(accelerations, h, e) && settings.samples(n)) interval.errors.add(e, radius, id, settings.scales);
   }
   /// Takes a contact of a sample, see contact_steps(). Of a wall `two` is monitor_wall.
   void take_contact(double effective_mass, double stiffness, double h, long one, long two) {
-    row.contact.add(contact_steps(effective_mass, stiffness, h), one, two);
+    interval.contact.add(contact_steps(effective_mass, stiffness, h), one, two);
   }
-  void take_impact(double deviation, long one) { row.impacts.add(deviation, one, INFINITY); }
-  /// Moves what was tallied since the last row into the sums of the run.
-  void close_row() {
-    run.merge(row);
-    row = {};
+  void take_impact(double deviation, long one) { interval.impacts.add(deviation, one, INFINITY); }
+  /// Moves the tallies of the interval into the sums of the run.
+  void close_interval() {
+    run.merge(interval);
+    interval = {};
   }
   MonitorTally all() const {
     MonitorTally sum = run;
-    sum.merge(row);
+    sum.merge(interval);
     return sum;
   }
 };
@@ -134,38 +134,31 @@ inline bool within_limits(const MonitorTally& t, const MonitorSettings& s) {
   return true;
 }
 
-/// A number as text, in the shortest of the usual forms.
-inline std::string monitor_number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
-
 /// A finding in words. `body`: what the engine calls a body.
 inline std::string finding_text(const MonitorTally& t, const MonitorSettings& s, int kind, const std::string& body) {
   if (kind == 3) {
     const auto name = [&](long id) { return id == monitor_wall ? std::string("a wall") : body + " " + std::to_string(id); };
-    return "the contact of " + name(t.contact.one) + " and " + name(t.contact.two) + " lasts " + monitor_number(t.contact.steps) +
-           " steps, less than " + monitor_number(s.least_steps) + "; take a shorter time step";
+    return "the contact of " + name(t.contact.one) + " and " + name(t.contact.two) + " lasts " + number_text(t.contact.steps, 3) +
+           " steps, less than " + number_text(s.least_steps, 3) + "; take a shorter time step";
   }
   const ErrorTally* const errors[] = {&t.errors.position, &t.errors.velocity, &t.errors.spin};
   static const char* const words[] = {"position", "velocity", "angular velocity"};
-  static const char* const over[] = {"the length", "the speed", "the speed over its radius"};
+  const std::string scale = kind == 0 ? "length = " + number_text(s.scales.length, 3) : "speed = " + number_text(s.scales.speed, 3);
   return std::string("the error of the ") + words[kind] + " of " + body + " " + std::to_string(errors[kind]->body) + " in one step is " +
-         monitor_number(errors[kind]->largest) + " of " + over[kind] + ", more than " + monitor_number(s.scales.limit) +
-         "; take a shorter time step";
+         number_text(errors[kind]->largest, 3) + " times " + scale + (kind == 2 ? " over its radius" : "") +
+         ", more than limit = " + number_text(s.scales.limit, 3) + "; take a shorter time step";
 }
 
-/// What `adapt` does after a row: halves of the step of the deck, 0 ... deepest_level.
+/// What `adapt` does after an interval: halves of the nominal time step, 0 ... deepest_level.
 constexpr int deepest_level = 10;
 /// The step goes to h / 2^level. It grows again when twice the step would have stayed at half of the limits: errors of positions and
 /// velocities are of third order in the step or less, from the touch of two bodies on (step_error.hpp).
-inline int adapted_level(const MonitorTally& row, const MonitorSettings& s, int level) {
-  if (!within_limits(row, s)) return std::min(level + 1, deepest_level);
-  const double largest = std::max({row.errors.position.largest, row.errors.velocity.largest, row.errors.spin.largest});
-  // A row in flight tells nothing of the next contact.
-  const bool touched = !std::isinf(row.contact.steps);
-  const bool room = touched && 8.0 * largest <= 0.5 * s.scales.limit && row.contact.steps >= 4.0 * s.least_steps;
+inline int adapted_level(const MonitorTally& interval, const MonitorSettings& s, int level) {
+  if (!within_limits(interval, s)) return std::min(level + 1, deepest_level);
+  const double largest = std::max({interval.errors.position.largest, interval.errors.velocity.largest, interval.errors.spin.largest});
+  // An interval without contacts says nothing about the next one.
+  const bool touched = !std::isinf(interval.contact.steps);
+  const bool room = touched && 8.0 * largest <= 0.5 * s.scales.limit && interval.contact.steps >= 4.0 * s.least_steps;
   return room ? std::max(level - 1, 0) : level;
 }
 

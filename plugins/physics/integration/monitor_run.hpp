@@ -1,12 +1,11 @@
-// A monitor over the runs of an engine, the same in all of them: what its command says, the rows of `adapt`, what was found, its figures,
-// and what restart files keep. The engines bring accelerations, contacts, and the pairs whose impacts are integrated anew.
+// A monitor over the runs of an engine, the same in all of them: what its command says, the intervals of `adapt`, what was found, its
+// figures, and what restart files keep. The engines bring accelerations, contacts, and the pairs whose impacts are integrated anew.
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
 #include <stdexcept>
 #include <string>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "../archive.hpp"
+#include "../keyword_reader.hpp"
 #include "monitor.hpp"
 #include "shadow_impact.hpp"
 
@@ -28,13 +28,13 @@ static_assert(monitor_history_numbers * sizeof(double) == sizeof(AccelerationHis
 struct MonitorCommand {
   MonitorSettings settings{{1.0, 0.0, 1e-2}};
   bool mean_length = true;  ///< errors of positions are measured by the mean diameter of the spheres
-  long rows = 0;            ///< steps of the deck between two rows of `adapt`
+  long rows = 0;            ///< nominal time steps in an interval of `adapt`
   long impacts = 0;         ///< every how many an impact is integrated anew; 0: none
 
   [[noreturn]] static void refuse(const std::string& line) { throw std::invalid_argument(line); }
   void set_action(const std::string& word) {
     if (!option_from_name(monitor_action_names(), word, settings.action))
-      refuse("action '" + word + "' is unknown; it can be report, warn, stop, adapt");
+      refuse("action '" + word + "' is unknown; it can be " + names_text(monitor_action_names()));
   }
   /// Throws std::invalid_argument with one line about what is wrong.
   void check() const {
@@ -42,7 +42,8 @@ struct MonitorCommand {
     if (const char* const wrong = settings.error()) refuse(wrong);
     if (impacts < 0) refuse("impacts must be 0 (none) or more, not " + std::to_string(impacts));
     const bool adapts = settings.action == MonitorAction::adapt;
-    if (adapts && rows < 1) refuse("action 'adapt' needs 'rows', the number (1 or more) of steps of the deck between two rows of output");
+    if (adapts && rows < 1)
+      refuse("action 'adapt' needs 'rows', the number (1 or more) of nominal time steps from one change of the step to the next");
     if (!adapts && rows != 0) refuse("rows belongs to action adapt");
   }
 
@@ -50,38 +51,23 @@ struct MonitorCommand {
   static MonitorCommand read(const std::vector<std::string>& words) {
     MonitorCommand command;
     MonitorSettings& s = command.settings;
-    for (std::size_t k = 0; k < words.size(); ++k) {
-      const std::string& word = words[k];
-      if (word == "speed") s.scales.speed = number(words, k);
+    keywords::Reader in(words);
+    while (in.left()) {
+      const std::string word = in.word("", ""), value = "the value";
+      if (word == "speed") s.scales.speed = in.number(word, value);
       else if (word == "length") {
-        s.scales.length = number(words, k);
+        s.scales.length = in.number(word, value);
         command.mean_length = false;
-      } else if (word == "limit") s.scales.limit = number(words, k);
-      else if (word == "contact_steps") s.least_steps = number(words, k);
-      else if (word == "every") s.every = integer(words, k);
-      else if (word == "impacts") command.impacts = integer(words, k);
-      else if (word == "rows") command.rows = integer(words, k);
-      else if (word == "action") command.set_action(++k < words.size() ? words[k] : "");
+      } else if (word == "limit") s.scales.limit = in.number(word, value);
+      else if (word == "contact_steps") s.least_steps = in.number(word, value);
+      else if (word == "every") s.every = in.integer(word, value);
+      else if (word == "impacts") command.impacts = in.integer(word, value);
+      else if (word == "rows") command.rows = in.integer(word, value);
+      else if (word == "action") command.set_action(in.word(word, value));
       else refuse("keyword '" + word + "' is unknown; it can be speed, length, limit, every, contact_steps, impacts, action, rows");
     }
     command.check();
     return command;
-  }
-
- private:
-  static double number(const std::vector<std::string>& words, std::size_t& k) {
-    const std::string& word = words[k];
-    char* end = nullptr;
-    const double value = ++k < words.size() ? std::strtod(words[k].c_str(), &end) : 0.0;
-    if (!end || *end || words[k].empty())
-      refuse("after " + word + " there must be a number" + (k < words.size() ? ", not '" + words[k] + "'" : ""));
-    return value;
-  }
-  static long integer(const std::vector<std::string>& words, std::size_t& k) {
-    const std::string& word = words[k];
-    const double value = number(words, k);
-    if (value != std::floor(value) || std::abs(value) > 1e9) refuse(word + " must be a whole number of steps, not '" + words[k] + "'");
-    return long(value);
   }
 };
 
@@ -174,22 +160,22 @@ class MonitorRun {
     state_.level = 0;
   }
   /// At the beginning of a run in step n, with the step h (s) of the engine; then step() is the one to take. What the script has set since
-  /// the last run is the new step of the deck.
+  /// the last run is the new nominal time step.
   void begin(double h, long n) {
     if (state_.step == 0.0 || (h != step() && h != state_.step)) take_step(h);
-    if (rows > 0 && state_.next_row <= double(n)) state_.next_row = double(n) + std::ldexp(rows, level());
+    if (rows > 0 && state_.interval_end <= double(n)) state_.interval_end = double(n) + std::ldexp(rows, level());
   }
   double step() const { return std::ldexp(state_.step, -level()); }  ///< s, of the steps to come
-  int level() const { return int(state_.level); }                    ///< step() is that of the deck over 2^level
-  long next_row() const { return long(state_.next_row); }
+  int level() const { return int(state_.level); }                    ///< step() is the nominal time step over 2^level
+  long interval_end() const { return long(state_.interval_end); }
 
-  /// At the end of step n: where a row ends, step() may be another from here on. Collective.
+  /// At the end of step n: where an interval ends, step() may be another from here on. Collective.
   void end_step(long n) {
     merged_at_ = -1;
-    if (rows == 0 || double(n) < state_.next_row) return;
-    state_.level = adapted_level(merged(monitor.row), monitor.settings, level());
-    monitor.close_row();
-    state_.next_row = double(n) + std::ldexp(rows, level());
+    if (rows == 0 || double(n) < state_.interval_end) return;
+    state_.level = adapted_level(merged(monitor.interval), monitor.settings, level());
+    monitor.close_interval();
+    state_.interval_end = double(n) + std::ldexp(rows, level());
   }
 
   /// One line for each kind of finding that is made for the first time. `body`: what the engine calls a body. Collective.
@@ -197,7 +183,7 @@ class MonitorRun {
     std::vector<std::string> lines;
     const MonitorAction action = monitor.settings.action;
     if (action != MonitorAction::warn && action != MonitorAction::stop) return lines;
-    const MonitorTally all = merged(monitor.row);
+    const MonitorTally all = merged(monitor.interval);
     for (int kind = 0; kind < monitor_kinds; ++kind) {
       if (state_.said >> kind & 1 || !finding(all, monitor.settings, kind)) continue;
       state_.said |= 1 << kind;
@@ -230,7 +216,7 @@ class MonitorRun {
       case 15: return double(merged_.contact.two);
       case 17: return step();
       case 18: return double(state_.level);
-      case 19: return state_.next_row;
+      case 19: return state_.interval_end;
       case 20: return merged_.impacts.count;
       case 21: return merged_.impacts.largest;
       case 22: return merged_.impacts.rms();
@@ -241,18 +227,18 @@ class MonitorRun {
 
   /// What goes on over runs and restarts, the same on all processes but for the tallies.
   struct State {
-    MonitorTally run{}, row{};
-    double step = 0.0;       // s, of the deck
-    double next_row = -1.0;  // its step
-    std::int64_t level = 0;  // the step in use is that of the deck over 2^level
-    std::int64_t said = 0;   // bits of the kinds of findings that were reported
+    MonitorTally run{}, interval{};
+    double step = 0.0;           // s, nominal
+    double interval_end = -1.0;  // its step
+    std::int64_t level = 0;      // the time step in use is the nominal one over 2^level
+    std::int64_t said = 0;       // bits of the kinds of findings that were reported
 
-    auto fields() { return std::tie(run, row, step, next_row, level, said); }
+    auto fields() { return std::tie(run, interval, step, interval_end, level, said); }
   };
   State state() const {
     State now = state_;
     now.run = monitor.run;
-    now.row = monitor.row;
+    now.interval = monitor.interval;
     return now;
   }
   /// What restart files keep: the states of each process by themselves, for a run that goes on adds to the same tallies.
@@ -276,11 +262,11 @@ class MonitorRun {
     mean_length = false;
     shadows.restore(std::move(under_way));
     state_ = all[0];
-    monitor.run = monitor.row = {};
+    monitor.run = monitor.interval = {};
     for (int p = 0; p < int(all.size()); ++p)
       if (int(all.size()) == processes ? p == process : process == 0) {
         monitor.run.merge(all[std::size_t(p)].run);
-        monitor.row.merge(all[std::size_t(p)].row);
+        monitor.interval.merge(all[std::size_t(p)].interval);
       }
   }
 

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "../contact.hpp"
+#include "../fnv.hpp"
 #include "adams.hpp"
 
 namespace dembark {
@@ -189,9 +190,7 @@ class ReferenceImpact {
 
 /// Whether the impact of these bodies in step n is one of every `kth`, on whatever process or thread it is asked.
 inline bool picked(long one, long two, long n, long kth) {
-  std::uint64_t hash = 1469598103934665603u;  // FNV-1a
-  for (const long number : {one, two, n}) hash = (hash ^ static_cast<std::uint64_t>(number)) * 1099511628211u;
-  return (hash >> 20) % static_cast<std::uint64_t>(kth) == 0;
+  return (fnv1a(std::array<long, 3>{one, two, n}) >> 20) % static_cast<std::uint64_t>(kth) == 0;
 }
 
 /// An impact that goes on in a run, beside the reference, which is over.

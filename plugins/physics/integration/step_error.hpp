@@ -13,21 +13,21 @@
 #include <cstddef>
 #include <tuple>
 
-#include "../contact_energy.hpp"  // Dofs
+#include "../contact_energy.hpp"  // SixVector
 
 namespace dembark {
 
 /// What the step that ended left undone: of position (m), velocity (m/s) and angular velocity (rad/s).
 struct LocalError {
   std::array<double, 3> position{};
-  Dofs velocity{};
+  SixVector velocity{};
 };
 
 /// Accelerations (m/s^2, then rad/s^2) of a body in its last steps: nineteen numbers, which an engine may keep beside the body.
 class AccelerationHistory {
  public:
   /// Takes the accelerations at the end of a step of h (s). False as long as there are too few, or after forget().
-  bool step(const Dofs& newest, double h, LocalError& error) {
+  bool step(const SixVector& newest, double h, LocalError& error) {
     const bool enough = known_ == double(kept_.size());
     if (enough) {
       for (std::size_t k = 0; k < newest.size(); ++k)
@@ -45,8 +45,8 @@ class AccelerationHistory {
   void forget() { known_ = 0.0; }
 
  private:
-  std::array<Dofs, 3> kept_{};  ///< newest first
-  double known_ = 0.0;          ///< how many of them are right
+  std::array<SixVector, 3> kept_{};  ///< newest first
+  double known_ = 0.0;               ///< how many of them are right
 };
 
 /// What errors are measured by, and how large they may be over it.

@@ -13,14 +13,14 @@
 
 namespace dembark::lcp {
 
-/// Rows, the matrix as what its rows do to each other: MatrixRows for one that is stored, impact::Lines for contacts between bodies.
-/// - near(): so many rows, the first, may carry a force. widen() takes others in that turn out to, and tells whether there were any.
-/// - force(i): z_i. set_force(i, z) leaves the sums as they are until gather() makes them anew.
-/// - gap(i), unit(i): w_i with those sums, 1 / sqrt(M_ii).
-/// - relax<Measured>(): one sweep; returns the largest step in units of the row's own scale.
+/// `Rows` multiplies by the matrix M: MatrixRows has it stored, impact::Lines makes the products from the contacts between bodies. It has
+/// - near(): the first near() rows may carry a force. widen() adds further rows that do, and returns whether it found any.
+/// - force(i): z_i. set_force(i, z) does not change the products M z; gather() computes them again.
+/// - gap(i): w_i with those products. unit(i): 1 / sqrt(M_ii).
+/// - relax<Measured>(): one sweep; returns the largest change of a force, scaled by its row.
 /// - energy(): z^T M z / 2 + q^T z, and measure(r): the residual, both after gather().
-/// - worth_steps: so many steps of conjugate gradients cost what a factor costs.
-/// - Face, of a face scaled to a unit diagonal: load(rows, face), clear(), and sums() with pulled(k) and push(k, force).
+/// - worth_steps: the number of steps of conjugate gradients that cost as much as a factorization.
+/// - Face: the rows that carry a force, scaled to a unit diagonal: load(rows, face), clear(), and sums() with pulled(k) and push(k, force).
 template <class Rows>
 class Relaxation {
  public:

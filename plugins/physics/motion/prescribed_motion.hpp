@@ -1,7 +1,7 @@
 // Prescribed motion of a wall: a sum of terms (terms.hpp), whose position, velocity and acceleration are known at any time. A wall has
 // infinite mass: nothing that touches it changes its motion.
 //
-// The words of a motion, which LIGGGHTS, YADE and Python read alike (SI units, rad):
+// The words of a motion, the same in all engines and Python (SI units, rad):
 //   harmonic amplitude X Y Z frequency F [phase P]                    circular first X Y Z second X Y Z frequency F [phase P]
 //   rocking point X Y Z axis X Y Z angle A frequency F [phase P]      rotation point X Y Z axis X Y Z rate W [acceleration B]
 //   uniform velocity X Y Z [acceleration X Y Z]                       table file NAME
@@ -86,7 +86,7 @@ class PrescribedMotion {
   /// The one clear line about a time step (s) that is too long for the motion, or nothing.
   std::string step_error(double h) const {
     if (!(shortest_period() < 10.0 * h)) return "";
-    return "its shortest period, " + motion::text(shortest_period()) + " s, is below ten time steps of " + motion::text(h) +
+    return "its shortest period, " + number_text(shortest_period()) + " s, is below ten time steps of " + number_text(h) +
            " s: take a shorter step";
   }
   /// Bounds (m) of the displacement from `from` to `to` (s); of oscillations at any time.
@@ -164,7 +164,7 @@ class PrescribedMotion {
   void add_oscillation(const motion::Given& given, const motion::Direction& sine, const motion::Direction& cosine) {
     motion::Oscillation term{sine, cosine, given.positive("frequency"), given.number_or("phase", 0.0), 0.0, {}};
     const double periods = given.number_or("ramp", 10.0);
-    if (!(periods >= 0.0)) given.refuse("ramp " + motion::text(periods) + " must be >= 0 periods");
+    if (!(periods >= 0.0)) given.refuse("ramp " + number_text(periods) + " must be >= 0 periods");
     term.ramp = periods / term.frequency;
     term.window = window(given, 2.0 * term.ramp);
     if (norm(sine.along) + norm(cosine.along) + std::abs(sine.about) == 0.0) given.refuse("its amplitude is zero");
@@ -188,12 +188,12 @@ class PrescribedMotion {
     term.interval = given.number_or("interval", term.duration);
     term.window = window(given);
     if (term.interval < term.duration)
-      given.refuse("interval " + motion::text(term.interval) + " s must be at least the duration, " + motion::text(term.duration) + " s");
+      given.refuse("interval " + number_text(term.interval) + " s must be at least the duration, " + number_text(term.duration) + " s");
     const std::string signs = given.has("signs") ? given.word("signs") : "+";
     if (signs.find_first_not_of("+-") != std::string::npos) given.refuse("signs '" + signs + "' must be of + and -, such as +--+");
     const double count = given.number_or("count", double(signs.size()));
     if (!(count >= 1.0 && count <= 1e6) || count != std::floor(count))
-      given.refuse("count " + motion::text(count) + " must be a whole number of 1 ... 1000000");
+      given.refuse("count " + number_text(count) + " must be a whole number of 1 ... 1000000");
     for (std::size_t k = 0; k < std::size_t(count); ++k) term.signs.push_back(signs[k % signs.size()] == '+' ? 1.0 : -1.0);
     term.prepare();
     jolts_.push_back(term);
@@ -213,11 +213,7 @@ class PrescribedMotion {
       if (words.empty() || words[0][0] == '#') continue;
       double row[4];
       bool good = words.size() == 4;
-      for (std::size_t k = 0; k < 4 && good; ++k) {
-        char* end = nullptr;
-        row[k] = std::strtod(words[k].c_str(), &end);
-        good = !*end && std::isfinite(row[k]);
-      }
+      for (std::size_t k = 0; k < 4 && good; ++k) good = keywords::Reader::is_number(words[k], row[k]);
       if (!good) given.refuse(where + "it must have four numbers, time (s) and displacement x y z (m)");
       if (!rows.empty() && !(row[0] > rows.back().time)) given.refuse(where + "the times do not ascend");
       rows.push_back({row[0], {row[1], row[2], row[3]}});

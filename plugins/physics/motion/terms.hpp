@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "../constants.hpp"
 #include "../vec3.hpp"
 #include "words.hpp"
 
@@ -23,7 +24,6 @@ struct WallState {
 
 namespace motion {
 
-constexpr double two_pi = 6.283185307179586476925286766559;
 constexpr double never = std::numeric_limits<double>::infinity();
 
 /// A function of time and its derivatives.
@@ -71,8 +71,8 @@ struct Window {
   void begin(double now) {
     if (!given) start = now;
     if (until > start && !(until < start + ramps)) return;
-    std::string line = "motion " + kind + ": until " + text(until) + " s must be later than start " + text(start) + " s";
-    if (ramps > 0.0) line += " by both ramps, " + text(ramps) + " s";
+    std::string line = "motion " + kind + ": until " + number_text(until) + " s must be later than start " + number_text(start) + " s";
+    if (ramps > 0.0) line += " by both ramps, " + number_text(ramps) + " s";
     throw std::invalid_argument(line);
   }
 };

@@ -2,26 +2,18 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <cstdlib>
 #include <map>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "../keyword_reader.hpp"
 #include "../vec3.hpp"
 
 namespace dembark {
 namespace motion {
-
-/// The shortest usual form of a number, for messages.
-inline std::string text(double x) {
-  std::ostringstream stream;
-  stream << x;
-  return stream.str();
-}
 
 inline std::vector<std::string> split(const std::string& line) {
   std::istringstream stream(line);
@@ -73,15 +65,14 @@ class Given {
   const std::string& word(const std::string& name) const { return values_.at(name)[0]; }
   double number(const std::string& name, std::size_t k = 0) const {
     const std::string& given = values_.at(name)[k];
-    char* end = nullptr;
-    const double value = std::strtod(given.c_str(), &end);
-    if (end == given.c_str() || *end || !std::isfinite(value)) refuse(name + " '" + given + "' is not a number");
+    double value;
+    if (!keywords::Reader::is_number(given, value)) refuse(name + " '" + given + "' is not a number");
     return value;
   }
   double number_or(const std::string& name, double otherwise) const { return has(name) ? number(name) : otherwise; }
   double positive(const std::string& name) const {
     const double value = number(name);
-    if (!(value > 0.0)) refuse(name + " " + text(value) + " must be > 0");
+    if (!(value > 0.0)) refuse(name + " " + number_text(value) + " must be > 0");
     return value;
   }
   Vec3<double> vector(const std::string& name) const {

@@ -372,9 +372,9 @@ inline void compute(const PairStep& s, PairBlock& b, int found) {
       const auto is_frozen = [&s](const int* grain) {
         return collect<P>([&s, grain](int k) { return s.mask[grain[k]] & s.frozen ? 1.0 : 0.0; }) > 0.0;
       };
-      // Between two held grains there is no damping (ContactParameters::respond).
-      const auto held_i = is_frozen(i), held_j = is_frozen(j);
-      reduced_mass = select(held_i & held_j, P(0.0), reduced(mass_i, mass_j, held_i, held_j));
+      // Between two frozen grains there is no damping (ContactParameters::respond).
+      const auto frozen_i = is_frozen(i), frozen_j = is_frozen(j);
+      reduced_mass = select(frozen_i & frozen_j, P(0.0), reduced(mass_i, mass_j, frozen_i, frozen_j));
     }
     const PackLaws<P, Elastic> laws{s,
                                     b,

@@ -19,6 +19,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "../fnv.hpp"
 #include "output_formats.hpp"
 
 namespace dembark::restart {
@@ -54,9 +55,7 @@ inline std::uint64_t hash_before(const std::string& path, std::int64_t end) {
   file.seekg(end - count);
   file.read(bytes.data(), count);
   if (!file || file.gcount() != count) return 0;
-  std::uint64_t hash = 1469598103934665603u;
-  for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * 1099511628211u;
-  return hash;
+  return fnv1a(bytes);
 }
 
 /// Files that are there, as they are. What streams of this process hold back is written first.

@@ -25,10 +25,8 @@ std::string digits(const Numbers&... numbers) {
 
 /// A text that is too long to be shown, by its hash (FNV-1a).
 inline std::string hashed(const std::string& text) {
-  std::uint64_t hash = 1469598103934665603u;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
   char number[24];
-  std::snprintf(number, sizeof number, "#%016" PRIx64, hash);
+  std::snprintf(number, sizeof number, "#%016" PRIx64, fnv1a(text));
   return number;
 }
 

@@ -136,12 +136,12 @@ struct Body {
 
 /// How an engine has moved a driven body since the fluid's last step, in one step of its own or several.
 struct DrivenMotion {
-  Vector way{}, turn{};       ///< m, rad
-  Vector velocity{}, spin{};  ///< m/s, rad/s, as the fluid's last step began
+  Vector displacement{}, turn{};  ///< m, rad
+  Vector velocity{}, spin{};      ///< m/s, rad/s, as the fluid's last step began
 
   /// A step of dt (s) of the engine at these velocities.
   void add(double dt, const Vector& v, const Vector& w) {
-    way += dt * v;
+    displacement += dt * v;
     turn += dt * w;
   }
   /// Before a step of dt (s) of the fluid: the body, which has place and velocities as the engine has them now, gets those of the step.
@@ -149,7 +149,7 @@ struct DrivenMotion {
     const Vector v = body.velocity, w = body.spin;
     body.acceleration = (1.0 / dt) * (v - velocity);
     body.spin_acceleration = (1.0 / dt) * (w - spin);
-    body.velocity = (1.0 / dt) * way;
+    body.velocity = (1.0 / dt) * displacement;
     body.spin = (1.0 / dt) * turn;
     *this = {{}, {}, v, w};
   }

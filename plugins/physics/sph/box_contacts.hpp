@@ -31,6 +31,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "../constants.hpp"
 #include "../finnie_rabinowicz.hpp"  // rotate_to_plane
 #include "../kinematics.hpp"
 #include "bodies.hpp"
@@ -46,7 +47,7 @@ struct Touch {
   static Touch of(double restitution, double friction) {
     double low = 0.0, high = 1.0;
     for (int k = 0; k < 60; ++k) {
-      const double z = 0.5 * (low + high), e = std::exp(-z * (3.141592653589793 - 2.0 * std::asin(z)) / std::sqrt(1.0 - z * z));
+      const double z = 0.5 * (low + high), e = std::exp(-z * (pi - 2.0 * std::asin(z)) / std::sqrt(1.0 - z * z));
       (e > restitution ? low : high) = z;
     }
     return {restitution, friction, restitution < 1.0 ? low : 0.0};
@@ -228,15 +229,15 @@ class BoxContacts {
     } else {
       const double twist = contact_twist(normal, one.spin, other ? other->spin : Vector{}, dt_);
       stretch = rotate_to_plane(xi, normal, twist) + dt_ * slide;
-      along = -(along_normal * k) * stretch - (along_normal * c) * slide;
+      along = -(tangential_stiffness_ratio * k) * stretch - (tangential_stiffness_ratio * c) * slide;
       const double size = norm(along);
       if (size > most) {
         along = (most / size) * along;
-        stretch = (-1.0 / (along_normal * k)) * along;
+        stretch = (-1.0 / (tangential_stiffness_ratio * k)) * along;
       }
     }
     if (remember_) xi = stretch;
-    stored += 0.5 * k * (overlap * overlap + along_normal * dot(stretch, stretch));
+    stored += 0.5 * k * (overlap * overlap + tangential_stiffness_ratio * dot(stretch, stretch));
     deepest = std::max(deepest, overlap);
     ++count;
     const Vector total = force * normal + along;
@@ -248,7 +249,7 @@ class BoxContacts {
     to.torque += cross(point - body.position, force);
   }
 
-  static constexpr double along_normal = 0.82;
+  static constexpr double tangential_stiffness_ratio = 0.82;  ///< k_t/k and c_t/c
   const std::vector<const Body*>* boxes_ = nullptr;
   std::vector<ContactWrench> wrenches_;
   double dt_ = 0.0;

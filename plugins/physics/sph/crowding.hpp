@@ -31,7 +31,7 @@ namespace dembark::sph {
 
 class Crowding {
  public:
-  /// particles: how many there are, of which rows speak.
+  /// particles: the number of particles whose neighbours add() takes.
   Crowding(const Settings& settings, std::size_t particles) : settings_(settings), weight_(particles) {
     with_kernel(settings_, [&](const auto& kernel) {
       each_of_lattice(settings_.dimension, settings_.h(), settings_.spacing,
@@ -40,8 +40,8 @@ class Crowding {
     });
   }
 
-  /// Adds neighbours: own(i), other(j): positions (m) of particle i of the rows and of neighbour j; none: the number that fills up rows.
-  /// mutual: each pair stands in the rows once, and j is one of the particles, too.
+  /// Adds the neighbours in `rows`. own(i), other(j): positions (m) of particle i and of its neighbour j; none: the number that fills up
+  /// rows; mutual: j is one of the particles, too, and each pair is in the rows only once.
   template <class Own, class Other>
   void add(const Rows& rows, int none, bool mutual, const Own& own, const Other& other) {
     with_kernel(settings_, [&](const auto& kernel) {

@@ -14,11 +14,11 @@
 #include <string>
 #include <vector>
 
+#include "../constants.hpp"
 #include "../pack.hpp"
 
 namespace dembark::sph {
 
-constexpr double pi = 3.14159265358979323846;
 /// Radius of both kernels over h.
 constexpr double support = 2.0;
 

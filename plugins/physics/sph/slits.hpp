@@ -64,7 +64,7 @@ inline std::array<int, 3> lattice_counts(const Vector& edges, double spacing) {
   for (std::size_t k = 0; k < 3; ++k) {
     counts[k] = int(std::lround(lengths[k] / spacing));
     if (counts[k] < 1 || std::abs(counts[k] * spacing - lengths[k]) > 1e-3 * spacing)
-      keywords::refuse("an edge of " + keywords::text(lengths[k]) + " m; it must be a whole number of the spacing, " +
+      keywords::refuse("an edge of " + keywords::text(lengths[k]) + " m must be an integer multiple of the spacing, " +
                        keywords::text(spacing) + " m");
   }
   return counts;
@@ -93,7 +93,7 @@ class Slits {
           if (!hidden(face, 0.5 * spacing, bodies)) continue;
           rims(face, 0.5 * spacing, density, gravity, pressure, bodies);
           relax(face);
-          spread_ways(face);
+          spread_distances(face);
           add(face, factor, spacing, density, bodies);
         }
   }
@@ -193,14 +193,14 @@ class Slits {
     return any;
   }
 
-  /// What is known of each hidden element: its weight, the sum of the given pressures around it, and the way to the rim.
+  /// What is known of each hidden element: its weight, the sum of the given pressures around it, and the distance to the rim.
   void rims(const Face& face, double reach, double density, const Vector& gravity, const std::vector<double>& pressures,
             const std::vector<Body>& bodies) {
     const std::size_t all = std::size_t(face.size());
     pressure_.assign(all, 0.0);
     weight_.assign(all, 0.0);
     given_.assign(all, 0.0);
-    way_.assign(all, std::numeric_limits<double>::infinity());
+    distance_.assign(all, std::numeric_limits<double>::infinity());
     const std::array<std::array<int, 2>, 4> steps{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
     face.each([&](int i, int j, std::size_t at) {
       const double own = face.pressure(i, j, density, gravity, pressures);
@@ -213,7 +213,7 @@ class Slits {
         const double half_step = 0.5 * (step[0] != 0 ? face.du : face.dv);
         if (ni >= 0 && ni < face.rows && nj >= 0 && nj < face.columns) {
           weight_[at] += 1.0;
-          if (other_[face.at(ni, nj)].what == open) way_[at] = std::min(way_[at], half_step);
+          if (other_[face.at(ni, nj)].what == open) distance_[at] = std::min(distance_[at], half_step);
           continue;
         }
         // The rim is half a step away.
@@ -222,7 +222,7 @@ class Slits {
         if (covers(rim + reach * out - 0.5 * reach * face.normal, face, bodies).what != open) continue;
         weight_[at] += 2.0;
         given_[at] += 2.0 * own;
-        way_[at] = std::min(way_[at], half_step);
+        distance_[at] = std::min(distance_[at], half_step);
       }
     });
   }
@@ -241,19 +241,19 @@ class Slits {
       });
   }
 
-  /// Ways (m) to the rim from element to element, where they are not known yet.
-  void spread_ways(const Face& face) {
-    const auto relax_way = [&](int i, int j) {
-      double& way = way_[face.at(i, j)];
+  /// Distances (m) to the rim from element to element, where they are not known yet.
+  void spread_distances(const Face& face) {
+    const auto relax_distance = [&](int i, int j) {
+      double& distance = distance_[face.at(i, j)];
       if (other_[face.at(i, j)].what == open) return;
-      if (i > 0) way = std::min(way, way_[face.at(i - 1, j)] + face.du);
-      if (i + 1 < face.rows) way = std::min(way, way_[face.at(i + 1, j)] + face.du);
-      if (j > 0) way = std::min(way, way_[face.at(i, j - 1)] + face.dv);
-      if (j + 1 < face.columns) way = std::min(way, way_[face.at(i, j + 1)] + face.dv);
+      if (i > 0) distance = std::min(distance, distance_[face.at(i - 1, j)] + face.du);
+      if (i + 1 < face.rows) distance = std::min(distance, distance_[face.at(i + 1, j)] + face.du);
+      if (j > 0) distance = std::min(distance, distance_[face.at(i, j - 1)] + face.dv);
+      if (j + 1 < face.columns) distance = std::min(distance, distance_[face.at(i, j + 1)] + face.dv);
     };
     for (int twice = 0; twice < 2; ++twice) {
-      face.each([&](int i, int j, std::size_t) { relax_way(i, j); });
-      face.each([&](int i, int j, std::size_t) { relax_way(face.rows - 1 - i, face.columns - 1 - j); });
+      face.each([&](int i, int j, std::size_t) { relax_distance(i, j); });
+      face.each([&](int i, int j, std::size_t) { relax_distance(face.rows - 1 - i, face.columns - 1 - j); });
     }
   }
 
@@ -267,7 +267,7 @@ class Slits {
       Body* const back = other.what == on_plane ? nullptr : &bodies[std::size_t(boxes[std::size_t(other.what)].body)];
       const Vector velocity = back ? back->velocity_at(here - back->position) : Vector{};
       const double rate = dot(velocity - body.velocity_at(here - body.position), face.normal);
-      const double speed = rate > 0.0 ? rate * way_[at] / std::max(0.5 * spacing - other.depth, thin * spacing) : 0.0;
+      const double speed = rate > 0.0 ? rate * distance_[at] / std::max(0.5 * spacing - other.depth, thin * spacing) : 0.0;
       const double p = std::max(pressure_[at] - 0.5 * density * speed * speed, 0.0);
       // Between two boxes each of both faces gives half.
       const Vector force = (-(back ? 0.5 : 1.0) * factor * p * face.du * face.dv) * face.normal;
@@ -280,7 +280,7 @@ class Slits {
   }
 
   std::vector<Cover> other_;
-  std::vector<double> pressure_, weight_, given_, way_;
+  std::vector<double> pressure_, weight_, given_, distance_;
 };
 
 }  // namespace dembark::sph

@@ -38,8 +38,8 @@ DEMBARK_FUNCTION inline void follow_path(const ContactParameters& p, bool wall, 
     layout.store(row, state);
     layout.swap_bodies(row, swapped);
     const ContactLevers levers(force.normal, relative_motion(b, force.normal, force.overlap));
-    const Dofs moves = dofs(b.velocity_1, b.angular_velocity_1), rests = dofs({}, b.spin_2());
-    Dofs loads{};
+    const SixVector moves = six_vector(b.velocity_1, b.angular_velocity_1), rests = six_vector({}, b.spin_2());
+    SixVector loads{};
     for (std::size_t k = 0; k < parts.count; ++k)
       add(loads, parts.load[k], k < force_part_count ? cross(levers.one, parts.load[k]) : parts.load[k]);
     const double values[results_of_path] = {force.force.x,

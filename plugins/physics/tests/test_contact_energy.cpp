@@ -71,7 +71,7 @@ Account impact(const ContactParameters& p, double dt) {
     const double normal = work(ContactPart::normal_elastic), tangential = work(ContactPart::tangential_elastic);
     const double viscous = work(ContactPart::normal_viscous) + work(ContactPart::tangential_viscous);
     const double capillary = work(ContactPart::cohesive), liquid = work(ContactPart::liquid_viscous);
-    const Vec3<double> spin = mean.relative_spin();
+    const Vec3<double> spin = mean.angular_velocity_1 - mean.spin_2();
     const double rolling = dot(parts[ContactPart::rolling_elastic], spin) * dt, lost = dot(parts[ContactPart::rolling_viscous], spin) * dt;
     out.rolling += rolling;
     out.rolling_viscous += lost;

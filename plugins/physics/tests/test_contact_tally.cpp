@@ -114,8 +114,8 @@ TEST_CASE("the words of the liquid: rules, walls, and one line for what is wrong
   REQUIRE(ledger.wall("base"));
   CHECK(ledger.wall("base")->pool == 1e-6);
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
-      {{"content", "nan"}, "content 'nan' is not a number"},
-      {{"volume"}, "volume is missing"},
+      {{"content", "nan"}, "content: the value must be a number, not 'nan'"},
+      {{"volume"}, "volume: the value is missing"},
       {{"content", "0.1", "volume", "1e-9"}, "the liquid of a grain is given once: either content or volume"},
       {{"wall", "base", "1", "1"},
        "wall must be followed by the ID of a fix wall, its liquid (m^3), the share it gives and the part it gets back"},

@@ -23,7 +23,7 @@ double entry(const Energies& energies, const std::string& name) {
 EnergyBody some_body(std::mt19937_64& random, unsigned blocked = 0) {
   std::uniform_real_distribution<double> u(-1.0, 1.0);
   EnergyBody body;
-  Dofs force{}, damping{};
+  SixVector force{}, damping{};
   body.mass = {2.0, 2.0, 2.0, 0.3, 0.3, 0.3};
   for (std::size_t k = 0; k < 6; ++k)
     if (blocked >> k & 1u) body.mass[k] = 0.0;
@@ -36,10 +36,10 @@ EnergyBody some_body(std::mt19937_64& random, unsigned blocked = 0) {
   return body;
 }
 
-Energies after_kick(EnergyBody body, const std::array<Dofs, contact_part_count>& loads, double h, int side) {
+Energies after_kick(EnergyBody body, const std::array<SixVector, contact_part_count>& loads, double h, int side) {
   EnergyLedger ledger;
   ledger.kinetic = ledger.first_kinetic = body.kinetic(body.velocity);
-  const Dofs after = body.kicked(h), before = body.velocity;
+  const SixVector after = body.kicked(h), before = body.velocity;
   for (std::size_t k = 0; k < 6; ++k) body.velocity[k] = side > 0 ? before[k] : side < 0 ? after[k] : 0.5 * (before[k] + after[k]);
   ledger.now.add_body(body);
   std::array<bool, contact_part_count> present;
@@ -56,8 +56,8 @@ TEST_CASE("the works of a kick are the same from its beginning, mean and end, an
   std::mt19937_64 random(5);
   for (const unsigned blocked : {0u, 9u, 63u}) {
     const EnergyBody body = some_body(random, blocked);
-    std::array<Dofs, contact_part_count> loads{};
-    for (Dofs& load : loads) load = some_body(random).force;
+    std::array<SixVector, contact_part_count> loads{};
+    for (SixVector& load : loads) load = some_body(random).force;
     const Energies begin = after_kick(body, loads, 0.01, 1), mean = after_kick(body, loads, 0.01, 0),
                    end = after_kick(body, loads, 0.01, -1);
     const double scale = entry(mean, "scale");
@@ -73,10 +73,10 @@ TEST_CASE("the works of a kick are the same from its beginning, mean and end, an
     for (std::size_t part = 0; part < force_part_count; ++part) contacts += mean[3 + part];
     contacts += entry(mean, "rolling_elastic") + entry(mean, "rolling_viscous");
     double expected = 0.0;
-    const Dofs after = body.kicked(0.01);
+    const SixVector after = body.kicked(0.01);
     for (std::size_t k = 0; k < 6; ++k)
       if (body.is_free(k))
-        for (const Dofs& load : loads) expected += 0.01 * load[k] * 0.5 * (body.velocity[k] + after[k]);
+        for (const SixVector& load : loads) expected += 0.01 * load[k] * 0.5 * (body.velocity[k] + after[k]);
     CHECK_THAT(contacts, WithinAbs(expected, 1e-14 * scale));
     if (blocked == 63u) CHECK(entry(mean, "gravity") == 0.0);
     else CHECK(entry(mean, "numerical_damping") < 0.0);
@@ -106,8 +106,8 @@ TEST_CASE("a velocity that the forces did not make is imposed", "[energy]") {
   EnergyLedger ledger;
   const double first = body.kinetic(body.velocity);
   ledger.first_kinetic = first;
-  const Dofs by_forces = body.kicked(0.01);
-  Dofs after = by_forces;
+  const SixVector by_forces = body.kicked(0.01);
+  SixVector after = by_forces;
   after[1] += 0.5;
   after[5] += 3.0;  // held: no kinetic energy
   ledger.kinetic = 0.0;

@@ -110,10 +110,10 @@ TEST_CASE("monitor: findings in words", "[monitor]") {
   CHECK_FALSE(within_limits(t, s));
   CHECK_FALSE(finding(t, s, 0));
   CHECK(finding_text(t, s, 1, "atom") ==
-        "the error of the velocity of atom 12 in one step is 0.002 of the speed, more than 0.001; take a shorter time step");
+        "the error of the velocity of atom 12 in one step is 0.002 times speed = 1, more than limit = 0.001; take a shorter time step");
   CHECK(finding_text(t, s, 2, "atom") ==
-        "the error of the angular velocity of atom 12 in one step is 0.005 of the speed over its radius, more than 0.001; take a shorter "
-        "time step");
+        "the error of the angular velocity of atom 12 in one step is 0.005 times speed = 1 over its radius, more than limit = 0.001; "
+        "take a shorter time step");
   CHECK(finding_text(t, s, 3, "body") == "the contact of body 3 and a wall lasts 6.28 steps, less than 10; take a shorter time step");
 }
 
@@ -131,7 +131,7 @@ TEST_CASE("monitor: the step is halved beyond the limits, and doubled well withi
   CHECK(adapted_level(row(0.0, 9.9), s, 3) == 4);
   CHECK(adapted_level(row(2e-3, 100), s, deepest_level) == deepest_level);
   CHECK(adapted_level(row(5e-5, 100), s, 2) == 1);
-  CHECK(adapted_level(row(5e-5, 100), s, 0) == 0);  // never longer than that of the deck
+  CHECK(adapted_level(row(5e-5, 100), s, 0) == 0);  // never longer than the nominal one
   CHECK(adapted_level(row(5e-5, 30), s, 2) == 2);   // twice the step would be too near to the limit
   CHECK(adapted_level(row(5e-4, 100), s, 2) == 2);
   CHECK(adapted_level({}, s, 2) == 2);  // no contact: nothing is known

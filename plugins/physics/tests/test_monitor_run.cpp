@@ -16,8 +16,8 @@ MonitorRun used() {
   run.begin(1e-5, 0);
   LocalError e;
   e.velocity = {0.1, 0.0, 0.0, 0.0, 0.0, 1.0};
-  run.monitor.row.errors.add(e, 0.0025, 12, run.monitor.settings.scales);
-  run.monitor.close_row();
+  run.monitor.interval.errors.add(e, 0.0025, 12, run.monitor.settings.scales);
+  run.monitor.close_interval();
   run.monitor.take_contact(1e-4, 1e3, 1e-5, 7, monitor_wall);
   ShadowImpact impact;
   impact.one = 3, impact.two = 4, impact.speed = 0.1;
@@ -40,7 +40,7 @@ TEST_CASE("monitor: what was saved comes back", "[monitor]") {
   CHECK(comes_back(MonitorRun(), saved, 0, 1));
   MonitorRun again;
   again.restore(saved);
-  CHECK(again.monitor.row.contact.two == monitor_wall);
+  CHECK(again.monitor.interval.contact.two == monitor_wall);
   CHECK(again.monitor.run.impacts.body == -1);
   CHECK(again.shadows.all().size() == 2);
   CHECK(again.step() == 1e-5);

@@ -287,7 +287,7 @@ TEST_CASE("SPH bodies: free fall, a torque-free top, points that turn", "[sph]")
   CHECK_THAT(top.position.z, WithinRel(-0.5 * 9.81, 1e-9));
   CHECK(norm(angular() - before) < 1e-3 * norm(before));
   CHECK_THAT(top.kinetic_energy() - top.mass * 9.81 * 9.81 / 2.0, WithinRel(energy, 1e-3));
-  const Vector turned = Rotation{}.turned({0.0, 0.0, 0.5 * sph::pi})({1.0, 0.0, 0.0});
+  const Vector turned = Rotation{}.turned({0.0, 0.0, 0.5 * pi})({1.0, 0.0, 0.0});
   CHECK_THAT(turned.y, WithinAbs(1.0, 1e-15));
   Body wheel;
   wheel.spin = {0.0, 0.0, 3.0};

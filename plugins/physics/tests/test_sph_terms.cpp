@@ -41,7 +41,7 @@ double integral(double to, const Function& f) {
 
 TEST_CASE("SPH kernels: they integrate to one, and their slope is their derivative over the distance", "[sph]") {
   each_kernel([](const auto& kernel, int dimension, double h) {
-    const auto shell = [&](double r) { return dimension == 2 ? 2.0 * sph::pi * r : 4.0 * sph::pi * r * r; };
+    const auto shell = [&](double r) { return dimension == 2 ? 2.0 * pi * r : 4.0 * pi * r * r; };
     CHECK_THAT(integral(2.0 * h, [&](double r) { return shell(r) * kernel.value(r); }), WithinRel(1.0, 1e-9));
     // -1/dimension integral r W' = 1: the moment of a lattice that is infinitely fine.
     CHECK_THAT(-integral(2.0 * h, [&](double r) { return shell(r) * r * r * kernel.slope(r); }) / dimension, WithinRel(1.0, 1e-9));

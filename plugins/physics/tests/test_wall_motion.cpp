@@ -69,7 +69,7 @@ TEST_CASE("wall motion: a ramped oscillation begins and ends at rest without a j
     }
   }
   // Full amplitude between.
-  const double w = motion::two_pi * 20.0;
+  const double w = two_pi * 20.0;
   for (double t = 0.71; t < 1.69; t += 0.0137)
     CHECK_THAT(motion.at(t).displacement.z, WithinAbs(1e-3 * std::sin(w * (t - 0.2) + 1.1), 1e-15));
 }
@@ -79,15 +79,15 @@ TEST_CASE("wall motion: circular motion goes round with constant speed", "[motio
   for (double t = 0.1; t < 0.5; t += 0.013) {
     const WallState s = motion.at(t);
     CHECK_THAT(norm(s.displacement), WithinAbs(2e-3, 1e-16));
-    CHECK_THAT(norm(s.velocity), WithinAbs(2e-3 * motion::two_pi * 10.0, 1e-14));
-    CHECK_THAT(cross(s.displacement, s.velocity).y, WithinAbs(4e-6 * motion::two_pi * 10.0, 1e-16));
+    CHECK_THAT(norm(s.velocity), WithinAbs(2e-3 * two_pi * 10.0, 1e-14));
+    CHECK_THAT(cross(s.displacement, s.velocity).y, WithinAbs(4e-6 * two_pi * 10.0, 1e-16));
   }
 }
 
 TEST_CASE("wall motion: pulses of acceleration add up, and + - - + comes back", "[motion]") {
   for (const char* shape : {"half_sine", "constant", "rising"}) {
     const PrescribedMotion one{std::string("jolts acceleration 3 0 0 duration 0.1 shape ") + shape};
-    const double part = std::string(shape) == "half_sine" ? 2.0 / (0.5 * motion::two_pi) : std::string(shape) == "constant" ? 1.0 : 0.5;
+    const double part = std::string(shape) == "half_sine" ? 2.0 / (0.5 * two_pi) : std::string(shape) == "constant" ? 1.0 : 0.5;
     CHECK_THAT(one.at(5.0).velocity.x, WithinAbs(3.0 * 0.1 * part, 1e-14));
     const PrescribedMotion four{std::string("jolts acceleration 3 0 0 duration 0.1 interval 0.25 count 4 signs +--+ shape ") + shape};
     CHECK_THAT(four.at(5.0).velocity.x, WithinAbs(0.0, 1e-14));

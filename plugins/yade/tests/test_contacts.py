@@ -159,7 +159,7 @@ def test_two_threads_find_the_same_forces(yade):
 def test_wrong_words_name_attribute_and_choices(found):
     said = found["messages"]
     for message, parts in zip(said, (("normalLaw", "'herz'", "hertz or hooke"),
-                                     ("presliding", "'bent'", "linear, exponential, partial_slip"),
+                                     ("presliding", "'bent'", "linear, exponential or partial_slip"),
                                      ("frictionLimit", "'viscous'", "total or elastic"),
                                      ("capillaryModel", "'wet'", "none, exact"), ("CylinderWall.radius", "> 0 m"),
                                      ("CylinderWall.axis", "not zero")), strict=True):

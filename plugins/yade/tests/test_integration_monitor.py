@@ -99,7 +99,7 @@ def test_impacts_show_the_lag_of_damping(found):
 
 def test_mistakes_are_told_in_one_line(found):
     told = ["needs 'speed'", "speed (m/s) must be a number > 0", "every must be 1 step or more", "limit must be > 0",
-            "contact_steps must be a number > 0", "'shout' is unknown; it can be report, warn, stop, adapt", "'adapt' needs 'rows'",
+            "contact_steps must be a number > 0", "'shout' is unknown; it can be report, warn, stop or adapt", "'adapt' needs 'rows'",
             "length", "impacts must be 0 (none) or more, not -1", "after InteractionLoop and before NewtonIntegrator", "give 'length' (m)"]
     assert len(told) == len(found["messages"])
     for line, words in zip(found["messages"], told, strict=True):

@@ -108,7 +108,7 @@ def test_frames_and_rows_can_be_read(found, tmp_path):
 
 @pytest.mark.parametrize(("name", "line"), [
     ("spacing", "SphFluid: spacing must be a number > 0 (m)"), ("sound", "SphFluid: soundSpeed must be a number > 0 (m/s)"),
-    ("kernel", "SphFluid.kernel is 'gauss'; it must be 'wendland_c2' or 'cubic_spline'"),
+    ("kernel", "SphFluid.kernel is 'gauss'; it must be wendland_c2 or cubic_spline"),
     ("smoothing", "smoothing (h over the spacing) must be between 0.8 and 3"), ("substeps", "SphFluid.substeps is 0; it must be 1 or more"),
     ("damping", "NewtonIntegrator.damping is 0.2; it must be 0 with SphFluid"), ("order", "before NewtonIntegrator"),
     ("long", "the time step must be > 0 and at most 0.6 h/soundSpeed = 0.624000 ms, not 2.000000 ms"),

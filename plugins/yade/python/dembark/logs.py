@@ -50,7 +50,7 @@ def drum(centre, radius, axis="z", omega=0.0, material=-1):
 
 
 def log_wall(place, axis, sense, material, **more):
-    """A plane wall of LogImpact through `place` (m), across `axis` (0 ... 2), that bounds the side `sense`; `more`: its attributes."""
+    """A plane wall of LcpImpact through `place` (m), across `axis` (0 ... 2), that bounds the side `sense`; `more`: its attributes."""
     return LogWall(bodies=[O.bodies.append(utils.wall(place, axis=axis, sense=sense, material=material))], **more)
 
 
