@@ -1,6 +1,7 @@
 #include "fix_arguments.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -22,19 +23,25 @@ struct Watched {
     arguments[{lammps, arg[0]}].assign(arg, arg + narg);
     return original(lammps, narg, arg);
   }
-  static void enter(LAMMPS* lammps, const char* name) {
+  /// False: it is there already.
+  static bool enter(LAMMPS* lammps, const char* name) {
     const auto found = lammps->modify->fix_map->find(name);
-    if (found == lammps->modify->fix_map->end() || found->second == &create) return;
+    if (found == lammps->modify->fix_map->end() || found->second == &create) return false;
     original = found->second;
     found->second = &create;
+    return true;
   }
 };
 
 }  // namespace
 
 void watch_fixes(LAMMPS* lammps) {
-  Watched<0>::enter(lammps, "ave/time");
+  const bool fresh = Watched<0>::enter(lammps, "ave/time");
   Watched<1>::enter(lammps, "wall/gran");
+  if (!fresh) return;
+  // Of a LAMMPS that was at the same address before.
+  for (auto each = arguments.begin(); each != arguments.end();)
+    each = each->first.first == lammps ? arguments.erase(each) : std::next(each);
 }
 
 bool may_have_argument(LAMMPS* lammps, const Fix& fix, const std::string& word) {

@@ -35,12 +35,12 @@ FixCapillaryLiquid::~FixCapillaryLiquid() { memory->destroy(own_); }
 /// volume GROUP V: the grains of a group own V (m^3) each.
 int FixCapillaryLiquid::modify_param(int narg, char** arg) {
   if (std::strcmp(arg[0], "volume") != 0) return 0;
-  const int its = narg > 1 ? group->find(arg[1]) : -1;
-  if (its < 0 || narg < 3 || !utils::is_double(arg[2])) fail("fix_modify is written 'volume GROUP V', with V in m^3 a grain");
+  const int group_index = narg > 1 ? group->find(arg[1]) : -1;
+  if (group_index < 0 || narg < 3 || !utils::is_double(arg[2])) fail("fix_modify is written 'volume GROUP V', with V in m^3 a grain");
   const double volume = utils::numeric(FLERR, arg[2], false, lmp);
   if (!(volume >= 0.0)) fail("volume (m^3 a grain) must be >= 0");
   for (int i = 0; i < atom->nlocal; ++i)
-    if (atom->mask[i] & group->bitmask[its]) own_[i] = volume;
+    if (atom->mask[i] & group->bitmask[group_index]) own_[i] = volume;
   return 3;
 }
 

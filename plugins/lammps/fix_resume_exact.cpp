@@ -12,7 +12,6 @@
 #include "update.h"
 
 #include "engine_access.h"
-#include "exact_fixes.h"
 #include "fix_arguments.h"
 #include "pair_dembark_granular.h"
 #include "restart_commands.h"
@@ -22,8 +21,7 @@ using namespace FixConst;
 
 namespace {
 
-constexpr double format = 2.0;
-enum Head { head_format, head_ranks, head_time, head_time_step, head_next_sort, head_size };
+enum Head { head_ranks, head_time, head_time_step, head_next_sort, head_size };
 
 }  // namespace
 
@@ -53,31 +51,16 @@ FixResumeExact::Facts FixResumeExact::facts() const {
   return {double(atom->nlocal), double(atom->nghost), order.high(), order.low()};
 }
 
-/// Collective.
-void FixResumeExact::check_state() const {
-  const std::string other = "; to go on from its positions and velocities alone, give this fix another id";
-  if (!known_format_) fail("the state was written by another version of dembark" + other);
-  if (saved_ranks_ == 0) fail("the restart file was not written by this fix" + other);
-  if (saved_ranks_ != comm->nprocs)
-    fail("the state is of " + std::to_string(saved_ranks_) + " ranks, the run has " + std::to_string(comm->nprocs) + other);
-  if (update->ntimestep != state_step_) fail("the run does not begin at the step of the state, " + std::to_string(state_step_) + other);
-  int fits = forces_.size() == std::size_t(atom->nlocal) && facts() == own_facts_, all = 0;
-  MPI_Allreduce(&fits, &all, 1, MPI_INT, MPI_MIN, world);
-  if (!all) fail("the atoms or their candidates for contacts are others than in the state" + other);
-}
-
 void FixResumeExact::put_back() {
-  check_state();
+  const std::string why = why_not_put_back(forces_.size() == std::size_t(atom->nlocal) && facts() == own_facts_);
+  if (!why.empty()) fail(why + "; to go on from its positions and velocities alone, give this fix another id");
   for (int i = 0; i < atom->nlocal; ++i) {
     std::copy_n(forces_[std::size_t(i)].data(), 3, atom->f[i]);
     if (atom->torque) std::copy_n(forces_[std::size_t(i)].data() + 3, 3, atom->torque[i]);
   }
   atom->nextsort = next_sort_;
-  const std::string why = why_approximate(record());
-  resume_outputs(why.empty());
-  say("dembark: resumed at step " + std::to_string(update->ntimestep) + (why.empty() ? " exactly" : " approximately: ") + why + "\n");
+  go_on(why_approximate(record()));
   forces_ = {};
-  state_step_ = -1;
 }
 
 void FixResumeExact::setup(int) {
@@ -100,7 +83,6 @@ void FixResumeExact::write_state() {
 void FixResumeExact::write_restart(FILE* file) {
   if (comm->me != 0) return;
   double head[head_size];
-  head[head_format] = format;
   head[head_ranks] = double(facts_.size());
   head[head_time] = update->atime;
   head[head_time_step] = double(update->atimestep);
@@ -109,31 +91,36 @@ void FixResumeExact::write_restart(FILE* file) {
 }
 
 void FixResumeExact::restart(char* buffer) {
-  double head[head_size];
-  std::memcpy(head, buffer, sizeof head);
   state_step_ = update->ntimestep;
   time_ = update->atime;
   time_step_ = update->atimestep;
-  known_format_ = head[head_format] == format;
-  saved_ranks_ = int(head[head_ranks]);
-  if (!known_format_ || saved_ranks_ != comm->nprocs) return;
-  std::memcpy(own_facts_.data(), buffer + sizeof head + std::size_t(comm->me) * sizeof(Facts), sizeof(Facts));
-  time_ = head[head_time];
-  time_step_ = bigint(head[head_time_step]);
-  next_sort_ = bigint(head[head_next_sort]);
-  saved_ = dembark::restart::RunRecord::read(buffer + sizeof head + std::size_t(saved_ranks_) * sizeof(Facts));
+  try {
+    dembark_family::SavedPart part(buffer);
+    double head[head_size];
+    part.read(head, head_size);
+    saved_ranks_ = int(head[head_ranks]);
+    std::vector<Facts> facts(static_cast<std::size_t>(saved_ranks_));
+    part.read(facts.data(), facts.size());
+    saved_ = dembark::restart::RunRecord::read(part.text());
+    if (saved_ranks_ == 0)
+      lacking_ =
+          "this restart file has no exact state: it was written by restart or write_restart; read one that fix resume/exact has written";
+    if (saved_ranks_ != comm->nprocs) return;
+    own_facts_ = facts[std::size_t(comm->me)];
+    time_ = head[head_time];
+    time_step_ = bigint(head[head_time_step]);
+    next_sort_ = bigint(head[head_next_sort]);
+  } catch (const std::exception&) {
+    lacking_ = other_version;
+    return;
+  }
   if (comm->me == 0) keep_unappendable();
 }
 
-std::string FixResumeExact::inexact_fix(Fix& fix, bigint step) const {
-  const auto known = std::find_if(std::begin(dembark_lammps::exact_fixes), std::end(dembark_lammps::exact_fixes),
-                                  [&](const auto& exact) { return is(fix, exact.style); });
-  if (known == std::end(dembark_lammps::exact_fixes)) return "begins anew or differently";
+std::string FixResumeExact::inexact_arguments(Fix& fix) const {
   const auto has = [&](const char* word) { return dembark_lammps::may_have_argument(lmp, fix, word); };
   if (is(fix, "wall/gran") && has("wiggle")) return "counts its time anew";
-  if (!is(fix, "ave/time")) return "";
-  if (has("running") || has("window")) return "averages over more than one interval";
-  return step % fix.global_freq == 0 ? "" : "is within an interval at step " + std::to_string(step);
+  return is(fix, "ave/time") && (has("running") || has("window")) ? "averages over more than one interval" : "";
 }
 
 std::vector<std::pair<std::string, std::string>> FixResumeExact::formulas() const { return dembark_lammps::formulas(input->variable); }
@@ -159,9 +146,7 @@ void FixResumeExact::unpack_restart(int i, int nth) {
 double FixResumeExact::memory_usage() { return double(forces_.size() * sizeof forces_[0]); }
 
 void ResumeState::command(int narg, char** arg) {
-  if (narg != 1) error->all(FLERR, "resume_state: it must have the form resume_state BASE");
-  const dembark::restart::State state = dembark_family::find_state(arg[0], *comm, world);
-  if (state.step < 0) error->all(FLERR, dembark_family::no_state(arg[0]));
+  const dembark::restart::State state = dembark_family::find_state(narg, arg, *comm, error, world);
   const std::string file = dembark::restart::state_name(arg[0], state.step);
   const int ranks = state.grid[0] * state.grid[1] * state.grid[2];
   if (ranks != comm->nprocs)

@@ -38,11 +38,10 @@ class FixResumeExact : public dembark_family::ResumeFix {
 
   bool keeps_order() const override { return state_step_ >= 0; }
   void write_state() override;
-  std::string inexact_fix(Fix& fix, bigint step) const override;
+  std::string inexact_arguments(Fix& fix) const override;
   std::vector<std::pair<std::string, std::string>> formulas() const override;
   void add_facts(dembark::restart::RunRecord& run) const override;
   Facts facts() const;
-  void check_state() const;
   void put_back();
 
   std::vector<Facts> facts_;                   // of all ranks, in a state; on the first one
@@ -51,8 +50,6 @@ class FixResumeExact : public dembark_family::ResumeFix {
   std::vector<std::array<double, 6>> forces_;  // of the state that was read: N, N m
   double time_ = 0.0;                          // s, of the step `time_step_`, from which the run counts it
   bigint time_step_ = 0, next_sort_ = 0;
-  int saved_ranks_ = 0;
-  bool known_format_ = true;
 };
 
 class ResumeState : public Command {

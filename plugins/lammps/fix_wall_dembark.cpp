@@ -25,14 +25,6 @@ using dembark_lammps::add;
 using dembark_lammps::Vec3;
 using dembark_lammps::vector;
 
-namespace {
-
-/// Global vector of a wall with a motion, behind the totals: displacement, angle, velocity, rate, acceleration, angular acceleration;
-/// power, work, impulse.
-constexpr int motion_numbers = 17;
-
-}  // namespace
-
 FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : RowsFix(lmp, narg, arg) {
   const auto word = [&](int k) { return k < narg ? std::string(arg[k]) : std::string(); };
   const std::string kind = word(3);
@@ -49,17 +41,16 @@ FixWallDembark::FixWallDembark(LAMMPS* lmp, int narg, char** arg) : RowsFix(lmp,
   checked([&] {
     if (kind == "region") surface_ = std::make_unique<dembark_lammps::RegionSurface>(lmp, word(4));
     else surface_ = std::make_unique<dembark_lammps::TriangleSurface>(lmp, word(4), precision);
-    for (int k = rest + 1; k < narg; ++k) words_ += (k > rest + 1 ? " " : "") + std::string(arg[k]);
-    if (narg > rest) motion_ = std::make_unique<dembark::PrescribedMotion>(words_);
+    if (narg > rest) moving_ = std::make_unique<dembark_family::MovingWall>(std::vector<std::string>(arg + rest + 1, arg + narg));
   });
   layout_ = pair_->coefficients().layout();
   restart_global = 1;
   vector_flag = peratom_flag = 1;
-  size_vector = int(totals_.size()) + (motion_ ? motion_numbers : 0);
+  size_vector = int(totals_.size()) + (moving_ ? dembark_family::MovingWall::all_numbers : 0);
   size_peratom_cols = 3;
   nevery = global_freq = peratom_freq = 1;
   extvector = 1;
-  time_depend = motion_ ? 1 : 0;
+  time_depend = moving_ ? 1 : 0;
   make_rows(0);
 }
 
@@ -72,26 +63,22 @@ void FixWallDembark::find_pair() {
   if (!pair_) fail("its coefficients are those of pair_style dembark/granular, which must come first");
 }
 
-int FixWallDembark::setmask() { return FixConst::POST_FORCE | (motion_ ? FixConst::END_OF_STEP : 0); }
+int FixWallDembark::setmask() { return FixConst::POST_FORCE | (moving_ ? FixConst::END_OF_STEP : 0); }
 
 void FixWallDembark::init() {
   find_pair();
   liquid_ = layout_.imbalance ? dembark_lammps::find_liquid(modify) : nullptr;
   tally_ = dembark_lammps::find_energy_tally(modify);
-  checked([&] { surface_->prepare(pair_->largest_radius() + (layout_.cohesion ? neighbor->skin : 0.0), motion_.get()); });
+  checked([&] {
+    surface_->prepare(pair_->largest_radius() + (layout_.cohesion ? neighbor->skin : 0.0), moving_ ? &moving_->motion() : nullptr);
+  });
   if (pair_->coefficients().layout().code() != layout_.code()) fail("pair_style has other options than before; define the fix again");
   check_types();
-  if (!motion_) return;
-  if (const std::string wrong = motion_->step_error(update->dt); !wrong.empty()) fail(wrong);
-  // Displacements are from where the surface stands when the motion is run first; a restart file has the time of that.
-  clock_.begin(update->atime, long(update->atimestep), long(update->ntimestep), update->dt);
-  checked([&] { motion_->begin(clock_.begun); });
-  const double now = clock_.time(update->ntimestep, update->dt);
-  Vec3 back, forth;
-  motion_->reach(now, now + double(update->laststep - update->ntimestep) * update->dt, back, forth);
+  if (!moving_) return;
+  checked([&] { moving_->begin(*update); });
   // A gate may leave, but grains cannot follow.
-  if (const std::string gone = surface_->outside(back, forth); !gone.empty())
-    warn("the motion takes its surface " + gone + ": grains that it takes along are lost");
+  if (const std::string gone = moving_->outside(surface_->middles(), {}, *update, *domain, world); !gone.empty())
+    warn("the motion takes its surface " + gone + "; grains that it takes along are lost");
 }
 
 /// Of grains with `pair_style hybrid` some may belong to another style.
@@ -105,25 +92,22 @@ void FixWallDembark::check_types() {
 }
 
 std::string FixWallDembark::not_for(int type) const {
-  const std::string other = std::to_string(type), its = std::to_string(wall_type_);
-  return "its group has grains of type " + other + ", and pair_coeff gives types " + other + " and " + its +
+  const std::string other = std::to_string(type), own = std::to_string(wall_type_);
+  return "its group has grains of type " + other + ", and pair_coeff gives types " + other + " and " + own +
          " no dembark/granular; give it, or take a group without them";
 }
 
 /// Takes up where the wall is now.
 void FixWallDembark::move() {
   // The clock first sees the beginning of the step, from which on a time step may be a new one.
-  const double dt = update->dt, before = clock_.time(update->ntimestep - 1, dt), now = clock_.time(update->ntimestep, dt);
-  state_ = motion_->at(now);
-  step_ = motion_->step(before, dt);
-  frame_ = dembark::WallFrame(*motion_, state_);
-  if (tally_) acceleration_ = wall_acceleration(*motion_, now, dt);
+  const double dt = update->dt, before = moving_->time(update->ntimestep - 1, dt), now = moving_->time(update->ntimestep, dt);
+  moving_->arrive(before, now, dt);
+  frame_ = dembark::WallFrame(moving_->motion(), moving_->state());
 }
 
 void FixWallDembark::setup(int vflag) {
   post_force(vflag);
-  if (motion_ && !resumed_) sums_.begin(wall_power(load(), state_, motion_->axis()), load().force);
-  resumed_ = false;
+  if (moving_) moving_->begin_sums(load());
 }
 
 /// The history that a contact goes on with, or nullptr.
@@ -136,11 +120,11 @@ const double* FixWallDembark::history_of(const dembark_lammps::WallContact& cont
   return nullptr;
 }
 
-Vec3 FixWallDembark::origin() const { return motion_ ? motion_->centre(state_) : surface_->origin(); }
+Vec3 FixWallDembark::origin() const { return moving_ ? moving_->centre() : surface_->origin(); }
 
 void FixWallDembark::post_force(int) {
   surface_->begin_step();
-  if (motion_) move();
+  if (moving_) move();
   totals_ = {};
   summed_ = -1;
   // The forces of the set-up are those of the present state, which stays.
@@ -174,9 +158,9 @@ void FixWallDembark::act_on(int i, bool advance) {
     b.mass_1 = pair_->mass(i);
     b.velocity_2 = contact.velocity;
     b.wall_spin = surface_->spin();
-    if (motion_) {
-      b.wall_spin = step_.rate * motion_->axis();
-      b.velocity_2 = step_.velocity + cross(b.wall_spin, x - b.separation - motion_->centre(state_));
+    if (moving_) {
+      b.wall_spin = moving_->spin();
+      b.velocity_2 = moving_->velocity_at(x - b.separation);
     }
     dembark::ContactState state;
     const double* const history = history_of(contact, centre, atom->radius[i]);
@@ -189,7 +173,8 @@ void FixWallDembark::act_on(int i, bool advance) {
     if (advance && !was_held && (state.cohesion.held() || (liquid_ && touching)))
       dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
     if (!out.interacting && !(volume > 0.0)) continue;
-    if (tally_ && out.interacting) tally_->add(p, b, out, state, advance, i, x, acceleration_);
+    if (tally_ && out.interacting)
+      tally_->add(p, b, out, state, advance, i, x, moving_ ? moving_->acceleration() : dembark::WallAcceleration{});
     if (advance) {
       slots.resize(slots.size() + std::size_t(slot_size()));
       double* const next = slots.data() + slots.size() - slot_size();
@@ -229,19 +214,11 @@ const std::array<double, 8>& FixWallDembark::totals() {
 
 dembark::WallLoad FixWallDembark::load() { return {vector(totals().data()), vector(totals().data() + 3)}; }
 
-void FixWallDembark::end_of_step() {
-  const dembark::WallLoad now = load();
-  sums_.step(update->dt, wall_power(now, state_, motion_->axis()), now.force);
-}
+void FixWallDembark::end_of_step() { moving_->end_step(load(), update->dt); }
 
 double FixWallDembark::compute_vector(int k) {
-  if (k < int(totals_.size())) return totals()[std::size_t(k)];
-  const auto& s = state_;
-  const double numbers[motion_numbers] = {s.displacement.x, s.displacement.y,       s.displacement.z, s.angle,          s.velocity.x,
-                                          s.velocity.y,     s.velocity.z,           s.rate,           s.acceleration.x, s.acceleration.y,
-                                          s.acceleration.z, s.angular_acceleration, sums_.power,      sums_.work,       sums_.impulse.x,
-                                          sums_.impulse.y,  sums_.impulse.z};
-  return numbers[k - int(totals_.size())];
+  const int count = int(totals_.size());
+  return k < count ? totals()[std::size_t(k)] : moving_->number(k - count);
 }
 
 void FixWallDembark::grow_arrays(int count) {
@@ -275,26 +252,27 @@ void FixWallDembark::unpack_restart(int i, int nth) {
 
 void FixWallDembark::write_restart(FILE* file) {
   if (comm->me != 0) return;
-  Region* const region = surface_->region();
-  int length = 0;
-  if (region) region->length_restart_string(length);
-  length += int(sizeof clock_ + sizeof sums_ + words_.size() + 1);
-  fwrite(&length, sizeof(int), 1, file);
-  fwrite(&clock_, sizeof clock_, 1, file);
-  fwrite(&sums_, sizeof sums_, 1, file);
-  fwrite(words_.c_str(), 1, words_.size() + 1, file);
-  if (region) region->write_restart(file);
+  dembark_family::Pieces pieces{{"", 1}};
+  if (moving_) pieces = moving_->pieces();
+  const std::string of_region = region_state();
+  pieces.emplace_back(of_region.data(), of_region.size());
+  write_part(file, pieces);
 }
 
 void FixWallDembark::restart(char* buffer) {
-  std::memcpy(static_cast<void*>(&clock_), buffer, sizeof clock_);
-  std::memcpy(static_cast<void*>(&sums_), buffer + sizeof clock_, sizeof sums_);
-  resumed_ = sums_.begun > 0.0;
-  const std::string before = buffer + sizeof clock_ + sizeof sums_;
-  if (before != words_)
-    fail("in the restart file its motion is '" + before +
-         "'; take that, or give the fix another ID: a motion that is new begins where the " + "surface stands in its file");
-  int read = int(sizeof clock_ + sizeof sums_ + before.size() + 1);
-  if (Region* const region = surface_->region(); region && !region->restart(buffer, read))
-    fail("the restart file was written with another region");
+  checked([&] {
+    dembark_family::SavedPart saved(buffer);
+    if (moving_) moving_->restore(saved);
+    else dembark_family::MovingWall::expect(saved, "");
+    std::vector<char> of_region = saved.rest<char>();
+    int read = 0;
+    if (of_region.size() != region_state().size() || (!of_region.empty() && !surface_->region()->restart(of_region.data(), read)))
+      throw std::invalid_argument("the restart file was written with another surface");
+  });
+}
+
+/// How a region moved in the last step, as LAMMPS writes it; nothing of triangles.
+std::string FixWallDembark::region_state() const {
+  Region* const region = surface_->region();
+  return region ? written([region](FILE* to) { region->write_restart(to); }) : "";
 }

@@ -3,8 +3,6 @@
 // dembark/motion/prescribed_motion.hpp says.
 //
 //   fix ID group wall/dembark region REGION|stl FILE type T [precision P] [motion TERM ...]
-//
-// Forces of step n are computed from the grains' velocities v(n-1/2). A wall has its own of that time, [x(n) - x(n-1)] / dt.
 #ifndef DEMBARK_FIX_WALL_DEMBARK_H
 #define DEMBARK_FIX_WALL_DEMBARK_H
 
@@ -14,10 +12,9 @@
 #include <vector>
 
 #include "dembark/contact_history.hpp"
-#include "dembark/motion/prescribed_motion.hpp"
 #include "dembark/motion/wall_frame.hpp"
-#include "dembark/motion/wall_work.hpp"
 #include "energy_tally.h"
+#include "moving_wall.h"
 #include "rows_fix.h"
 #include "wall_surface.h"
 
@@ -40,7 +37,6 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
   int pack_restart(int i, double* buffer) override;
   void unpack_restart(int i, int nth) override;
   int size_restart(int i) override { return 1 + RowsFix::size_restart(i); }
-  // How a moving region moved in the last step; time and work of a motion.
   void write_restart(FILE* file) override;
   void restart(char* buffer) override;
 
@@ -59,8 +55,8 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
  private:
   int wall_type_ = 0;
   std::unique_ptr<dembark_lammps::WallSurface> surface_;
-  std::unique_ptr<dembark::PrescribedMotion> motion_;
-  std::string words_;  // of the motion
+  std::unique_ptr<dembark_family::MovingWall> moving_;  // nullptr: it stands, or its region moves by itself
+  dembark::WallFrame frame_;
   class PairDembarkGranular* pair_ = nullptr;
   class FixCapillaryLiquid* liquid_ = nullptr;
   dembark::HistoryLayout layout_;
@@ -71,15 +67,9 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
   std::array<double, 8> totals_{}, all_totals_{};  // on this process, and on all at the step `summed_`
   bigint summed_ = -1;
 
-  dembark::MotionClock clock_;
-  dembark::WallState state_;  // now
-  dembark::WallStep step_;    // that led to it
-  dembark::WallFrame frame_;
-  dembark::WallSums sums_;
   dembark_lammps::EnergyTally* tally_ = nullptr;
-  dembark::WallAcceleration acceleration_;  // for the tally; of regions that move by themselves it is not known
-  bool resumed_ = false;                    // the last step of `sums_` is that of a restart file
 
+  std::string region_state() const;
   int slot_size() const { return 1 + layout_.size(); }
   /// In restart files before a row: negative, as no part of a surface is.
   double layout_key() const { return -1.0 - layout_.code(); }

@@ -7,7 +7,8 @@
 
 namespace dembark_lammps {
 
-/// The first members of LAMMPS's FixNeighHistory, whose header no package of LAMMPS holds. neighbor_history() makes sure that they are.
+/// The first members of LAMMPS's FixNeighHistory, whose header no package of LAMMPS holds. Pair style dembark/granular checks that they
+/// are.
 struct NeighborHistory : LAMMPS_NS::Fix {
   int nlocal_neigh;       ///< owned atoms when the list was built
   int nall_neigh;         ///< the same with ghosts

@@ -26,6 +26,13 @@ using dembark::ContactState;
 using dembark_lammps::add;
 using dembark_lammps::vector;
 
+namespace {
+
+constexpr const char* other_release =
+    "is another one than in the releases of LAMMPS that dembark knows; take one that docs/how-to/lammps_build.md names";
+
+}  // namespace
+
 PairDembarkGranular::PairDembarkGranular(LAMMPS* lmp) : Pair(lmp), coefficients_(lmp) {
   single_enable = 1;
   restartinfo = 0;  // the script gives the coefficients again
@@ -35,7 +42,6 @@ PairDembarkGranular::PairDembarkGranular(LAMMPS* lmp) : Pair(lmp), coefficients_
   centroidstressflag = CENTROID_NOTAVAIL;
   single_extra = single_numbers;
   svector = new double[single_numbers]();
-  // Histories come before the fixes that the script defines: they are put in their place later, when their size is known.
   comm_forward = 1;
   // Restart files know histories by this name: it counts the styles that are there, not all that ever were.
   const auto taken = [this](const std::string& name) {
@@ -45,6 +51,7 @@ PairDembarkGranular::PairDembarkGranular(LAMMPS* lmp) : Pair(lmp), coefficients_
   int number = 1;
   do history_name_ = "NEIGH_HISTORY_DEMBARK_" + std::to_string(number++) + "_";
   while (taken(history_name_));
+  // Histories come before the fixes that the script defines: they are put in their place later, when their size is known.
   modify->add_fix(history_name_ + "PLACE all DUMMY", 0);
 }
 
@@ -88,7 +95,7 @@ void PairDembarkGranular::init_style() {
       coefficients_.fail(
           "the restart file has histories of contacts that were computed with other options; take the same options, or begin without "
           "histories: from a data file");
-    if (!std::strstr(typeid(*made).name(), "FixNeighHistory")) error->all(FLERR, "dembark: LAMMPS's fix NEIGH_HISTORY is not what it was");
+    if (!std::strstr(typeid(*made).name(), "FixNeighHistory")) coefficients_.fail("fix NEIGH_HISTORY " + std::string(other_release));
     history_ = static_cast<dembark_lammps::NeighborHistory*>(made);
     history_->pair = this;
   }
@@ -98,12 +105,12 @@ void PairDembarkGranular::init_style() {
   freeze_bit_ = freeze.empty() ? 0 : freeze.front()->groupbit;
   liquid_ = layout_.imbalance ? dembark_lammps::find_liquid(modify) : nullptr;
   if (layout_.imbalance && !liquid_) coefficients_.fail("carried_liquid on needs the liquid: fix ID all capillary/liquid content C");
-  // Lists of bonded atoms hold pairs that do not interact.
   energies_ = dembark_lammps::find_energy_tally(modify);
   rigid_.clear();
   for (Fix* const fix : modify->get_fix_list())
     if (fix->rigid_flag) rigid_.push_back(fix);
   const dembark::ContactParameters& any = coefficients_(1, 1);
+  // Lists of bonded atoms hold pairs that do not interact.
   packed_ = any.normal_law == dembark::NormalLaw::hertz && !any.cohesion.liquid.viscous.on() && asked() && atom->molecular == Atom::ATOMIC;
   const auto place = [](bool there, int at) { return there ? at : -1; };
   begin(*atom,
@@ -120,12 +127,8 @@ std::string PairDembarkGranular::history_fix() const {
 }
 
 void PairDembarkGranular::check_run() {
-  if (!dembark_family::has_coherent_units(*force))
-    coefficients_.fail(std::string("in units ") + update->unit_style +
-                       " force is not mass times acceleration, and the law needs that; use units si, cgs, micro, nano or lj");
-  if (!dembark_family::is_verlet(*update))
-    coefficients_.fail(std::string("contacts follow one time step, and run_style ") + update->integrate_style +
-                       " has several; use run_style verlet");
+  for (const std::string& wrong : {dembark_family::units_error(*force, *update), dembark_family::run_style_error(*update)})
+    if (!wrong.empty()) coefficients_.fail(wrong);
   if (update->whichflag == 2)
     coefficients_.fail(
         "contacts have no energy that minimize could lower; let grains come to rest in a run, with fix viscous or nve/limit");
@@ -267,7 +270,9 @@ void PairDembarkGranular::advance_packs() {
 
 void PairDembarkGranular::compute(int eflag, int vflag) {
   ev_init(eflag, vflag);
-  if (history_->nlocal_neigh != atom->nlocal) error->one(FLERR, "dembark: LAMMPS's fix NEIGH_HISTORY is not what it was");
+  if (history_->nlocal_neigh != atom->nlocal)
+    error->one(FLERR, "pair_style dembark/granular: fix NEIGH_HISTORY has histories of {} grains, and there are {}: it {}",
+               history_->nlocal_neigh, atom->nlocal, other_release);
   if (neighbor->ago == 0) {
     check_radii();
     if (!rigid_.empty()) take_body_masses();

@@ -10,7 +10,6 @@
 #include "utils.h"
 
 #include "contact_call.h"
-#include "dembark/motion/words.hpp"
 #include "shared_stl.h"
 
 using namespace LAMMPS_NS;
@@ -137,26 +136,13 @@ bool TriangleSurface::goes_on(int before, const WallContact& now, const Vec3& ce
   return false;
 }
 
-std::string TriangleSurface::outside(const Vec3& back, const Vec3& forth) const {
-  Vec3 low{1e300, 1e300, 1e300}, high = -1.0 * low;
+std::vector<Vec3> TriangleSurface::middles() const {
+  std::vector<Vec3> all;
   for (std::size_t i = 0; i < own_; ++i) {
     const Triangle& triangle = surface_.triangles()[i];
-    const Vec3 centre = (1.0 / 3.0) * (triangle.node[0] + triangle.node[1] + triangle.node[2]);
-    for (double Vec3::* const axis : axes) {
-      low.*axis = std::min(low.*axis, centre.*axis);
-      high.*axis = std::max(high.*axis, centre.*axis);
-    }
+    all.push_back((1.0 / 3.0) * (triangle.node[0] + triangle.node[1] + triangle.node[2]));
   }
-  low += back;
-  high += forth;
-  for (int k = 0; k < 3; ++k) {
-    const double from = low.*axes[k], to = high.*axes[k];
-    if (domain->periodicity[k] || domain->boundary[k][0] >= 2 || (from >= domain->boxlo[k] && to <= domain->boxhi[k])) continue;
-    using dembark::motion::text;
-    return std::string("out of the box along ") + "xyz"[k] + ", from " + text(from) + " to " + text(to) + " m beside " +
-           text(domain->boxlo[k]) + " ... " + text(domain->boxhi[k]) + " m";
-  }
-  return "";
+  return all;
 }
 
 }  // namespace dembark_lammps

@@ -45,9 +45,8 @@ class WallSurface : protected LAMMPS_NS::Pointers {
   virtual dembark::Vec3<double> spin() const { return {}; }    ///< rad/s, of its own motion
   virtual dembark::Vec3<double> origin() const { return {}; }  ///< m, of moments
   virtual LAMMPS_NS::Region* region() const { return nullptr; }
-  /// Where it is out of the box when it is moved by `back` to `forth` (m), with the bounds of both; nothing when it is not or has none.
-  /// Middles of triangles count, in directions that neither are periodic nor shrink.
-  virtual std::string outside(const dembark::Vec3<double>& /*back*/, const dembark::Vec3<double>& /*forth*/) const { return ""; }
+  /// m, of its triangles, if it has any, in the surface's own frame.
+  virtual std::vector<dembark::Vec3<double>> middles() const { return {}; }
 
  protected:
   std::vector<WallContact> found_;
@@ -79,7 +78,7 @@ class TriangleSurface : public WallSurface {
   void prepare(double reach, const dembark::PrescribedMotion* motion) override;
   const std::vector<WallContact>& contacts(const dembark::Vec3<double>& centre, double radius, double reach) override;
   bool goes_on(int before, const WallContact& now, const dembark::Vec3<double>& centre, double radius) const override;
-  std::string outside(const dembark::Vec3<double>& back, const dembark::Vec3<double>& forth) const override;
+  std::vector<dembark::Vec3<double>> middles() const override;
 
  private:
   std::size_t own_ = 0;  // triangles of the file, which come first

@@ -36,8 +36,8 @@ EnergyAccountFix::EnergyAccountFix(LAMMPS* lmp, int narg, char** arg, dembark::C
 void EnergyAccountFix::init() {
   only_verlet();
   if (force->newton_pair) fail("newton must be off: each rank tallies for the grains that it owns");
-  if (!has_coherent_units() || force->nktv2p != 1.0) fail("units must be si or cgs");
-  if (!has_spheres()) fail(std::string("it accounts for spheres only: ") + sphere_style);
+  only_coherent_units();
+  only_spheres("it accounts for");
   check_contacts();
   check_motion();
 }
@@ -79,7 +79,7 @@ inline dembark::BodyMotion EnergyAccountFix::motion(int i) const {
 inline EnergyBody EnergyAccountFix::body(int i) const {
   EnergyBody grain{motion(i)};
   dembark::Vec3<double> weight;
-  for (const auto& [group, acceleration] : falls_)
+  for (const auto& [group, acceleration] : gravity_accelerations_)
     if (atom->mask[i] & group) weight += atom->rmass[i] * acceleration;
   grain.set_forces(six(atom->f[i], atom->torque[i]), dembark::six_vector(weight, {}));
   return grain;
@@ -94,10 +94,13 @@ double EnergyAccountFix::kinetic() const {
 
 /// Powers of all forces as they are, with the velocities as they are.
 void EnergyAccountFix::measure_powers() {
-  if (tally_.loads.size() != std::size_t(atom->nlocal)) fail_alone("atoms came or went between the forces and the end of a step");
+  if (const std::size_t before = tally_.loads.size(); before != std::size_t(atom->nlocal))
+    fail_alone("in step " + std::to_string(update->ntimestep) + " a rank had " + std::to_string(before) +
+               " atoms when forces were computed and " + std::to_string(atom->nlocal) +
+               " after it; create and delete atoms between runs, or by fixes that do so before the forces of a step");
   now_.now = Powers();
-  falls_.clear();
-  for (const Gravity& gravity : gravities_) falls_.emplace_back(gravity.group, gravity.acceleration());
+  gravity_accelerations_.clear();
+  for (const Gravity& gravity : gravities_) gravity_accelerations_.emplace_back(gravity.group, gravity.acceleration());
   for (int i = 0; i < atom->nlocal; ++i) {
     const EnergyBody grain = body(i);
     now_.now.add_body(grain);
@@ -184,38 +187,42 @@ void EnergyAccountFix::end_of_step() {
   shown_ = now_;
 }
 
-/// The energies in their order, without numerical damping, which these engines have not. Collective.
+/// Collective.
 double EnergyAccountFix::compute_vector(int n) {
-  constexpr int numerical_damping = 4 + int(dembark::force_part_count);
   if (!begun_ && !fresh_) return 0.0;
   const EnergyLedger mine = fresh_ ? with_setup() : shown_;
   EnergyLedger all;
   MPI_Allreduce(&mine, &all, int(dembark::energy_ledger_size), MPI_DOUBLE, MPI_SUM, world);
-  return all.energies()[std::size_t(n < numerical_damping ? n : n + 1)];
+  return all.energies()[std::size_t(n < place("numerical_damping") ? n : n + 1)];
 }
 
 /// Collective. The sums of each rank by themselves: added up otherwise, they would round otherwise.
 void EnergyAccountFix::write_restart(FILE* file) {
-  const int ranks = comm->nprocs, size = int(dembark::energy_ledger_size);
-  std::vector<double> all(comm->me == 0 ? std::size_t(ranks) * dembark::energy_ledger_size : 0);
+  constexpr int size = int(dembark::energy_ledger_size);
+  std::vector<double> all(comm->me == 0 ? std::size_t(comm->nprocs) * dembark::energy_ledger_size : 0);
   MPI_Gather(&now_, size, MPI_DOUBLE, all.data(), size, MPI_DOUBLE, 0, world);
   if (comm->me != 0) return;
-  const double head[] = {double(begun_), double(ranks)};
+  const double head[] = {double(begun_), double(comm->nprocs)};
   write_part(file, {{head, sizeof head}, {all.data(), all.size() * sizeof(double)}});
 }
 
 /// On another number of ranks the first has the sums of all.
 void EnergyAccountFix::restart(char* buffer) {
-  double head[2];
-  std::memcpy(head, buffer, sizeof head);
-  begun_ = head[0] != 0.0;
-  const int ranks = int(head[1]);
-  resumed_ = ranks == comm->nprocs;
-  std::vector<double> saved(std::size_t(ranks) * dembark::energy_ledger_size);
-  std::memcpy(saved.data(), buffer + sizeof head, saved.size() * sizeof(double));
-  std::array<double, dembark::energy_ledger_size> sum{};
+  constexpr std::size_t size = dembark::energy_ledger_size;
+  std::vector<double> saved;
+  checked([&] {
+    SavedPart part(buffer);
+    double head[2];
+    part.read(head, 2);
+    begun_ = head[0] != 0.0;
+    resumed_ = int(head[1]) == comm->nprocs;
+    saved.resize(std::size_t(head[1]) * size);
+    part.read(saved.data(), saved.size());
+    part.end();
+  });
+  std::array<double, size> sum{};
   for (std::size_t k = 0; k < saved.size(); ++k)
-    if (const int rank = int(k / sum.size()); resumed_ ? rank == comm->me : comm->me == 0) sum[k % sum.size()] += saved[k];
+    if (const int rank = int(k / size); resumed_ ? rank == comm->me : comm->me == 0) sum[k % size] += saved[k];
   std::memcpy(static_cast<void*>(&now_), sum.data(), sizeof now_);
   shown_ = now_;
 }

@@ -6,6 +6,8 @@
 #ifndef DEMBARK_ENERGY_ACCOUNT_FIX_H
 #define DEMBARK_ENERGY_ACCOUNT_FIX_H
 
+#include <string_view>
+
 #include "shared_fix.h"
 
 #include "dembark/contact_tally.hpp"
@@ -29,6 +31,16 @@ class EnergyAccountFix : public GrainFix {
   void restart(char* buffer) override;
   double memory_usage() override;
 
+  /// Where its vector has an energy: they are in their order, but for numerical damping, which these engines have not.
+  static constexpr int place(std::string_view energy) {
+    int k = 0;
+    for (const std::string_view one : dembark::energy_names) {
+      if (one == energy) break;
+      k += one != "numerical_damping";
+    }
+    return k;
+  }
+
  protected:
   /// Before anything of a step, and after all output of the step before.
   void begin_step();
@@ -46,12 +58,13 @@ class EnergyAccountFix : public GrainFix {
   void impose(double change, double of, double& sum) const;
 
   dembark::ContactTally& tally_;
-  dembark::EnergyLedger now_, shown_;                         // of this rank; shown_: at the end of the last step, or of the set-up
-  bool begun_ = false;                                        // the first_ values are there
-  bool fresh_ = false;                                        // forces are those of a set-up
-  bool resumed_ = false;                                      // powers come from a restart file, for its forces
-  double kinetic_before_ = 0.0;                               // J, with the atoms before they are exchanged
-  std::vector<std::pair<int, dembark::Vec3<double>>> falls_;  // bits of groups, and their accelerations by gravity (m/s^2) now
+  dembark::EnergyLedger now_, shown_;  // of this rank; shown_: at the end of the last step, or of the set-up
+  bool begun_ = false;                 // the first_ values are there
+  bool fresh_ = false;                 // forces are those of a set-up
+  bool resumed_ = false;               // powers come from a restart file, for its forces
+  double kinetic_before_ = 0.0;        // J, with the atoms before they are exchanged
+  // Bits of groups, and their accelerations by gravity (m/s^2) now.
+  std::vector<std::pair<int, dembark::Vec3<double>>> gravity_accelerations_;
 };
 
 }  // namespace dembark_family

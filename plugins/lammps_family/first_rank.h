@@ -36,18 +36,18 @@ class FirstRank {
     MPI_Gather(&count, 1, MPI_INT, counts_.data(), 1, MPI_INT, 0, world_);
     if (is_here()) {
       std::partial_sum(counts_.begin(), counts_.end() - 1, offsets_.begin() + 1);
-      all.resize(std::size_t(offsets_.back() + counts_.back()));
+      all.resize(std::size_t(offsets_.back()) + std::size_t(counts_.back()));
     }
-    const std::vector<int> sizes = bytes<T>(counts_), places = bytes<T>(offsets_);
-    MPI_Gatherv(own.data(), count * int(sizeof(T)), MPI_BYTE, all.data(), sizes.data(), places.data(), MPI_BYTE, 0, world_);
+    const DataType<T> type;
+    MPI_Gatherv(own.data(), count, type.of, all.data(), counts_.data(), offsets_.data(), type.of, 0, world_);
   }
 
   /// The way back of the last gather(): `all` of the first rank to `own`, which has the size that it had there.
   template <class T>
   void scatter(std::vector<T>& all, std::vector<T>& own) {
     if (ranks_ == 1) return own.swap(all);
-    const std::vector<int> sizes = bytes<T>(counts_), places = bytes<T>(offsets_);
-    MPI_Scatterv(all.data(), sizes.data(), places.data(), MPI_BYTE, own.data(), int(own.size() * sizeof(T)), MPI_BYTE, 0, world_);
+    const DataType<T> type;
+    MPI_Scatterv(all.data(), counts_.data(), offsets_.data(), type.of, own.data(), int(own.size()), type.of, 0, world_);
   }
 
   /// Runs `work` on the first rank, and makes its `record` that of all. What went wrong there, on all ranks: one line, or nothing.
@@ -71,11 +71,18 @@ class FirstRank {
   }
 
  private:
+  /// Counted in values: of bytes there may be more than an int holds.
   template <class T>
-  static std::vector<int> bytes(std::vector<int> counts) {
-    for (int& n : counts) n *= int(sizeof(T));
-    return counts;
-  }
+  struct DataType {
+    MPI_Datatype of;
+    DataType() {
+      MPI_Type_contiguous(int(sizeof(T)), MPI_BYTE, &of);
+      MPI_Type_commit(&of);
+    }
+    ~DataType() { MPI_Type_free(&of); }
+    DataType(const DataType&) = delete;
+    DataType& operator=(const DataType&) = delete;
+  };
 
   MPI_Comm world_;
   int ranks_ = 1, rank_ = 0;

@@ -14,8 +14,7 @@ using namespace dembark::impact;
 namespace dembark_family {
 
 ImpactFix::ImpactFix(LAMMPS* lmp, int narg, char** arg, const char* mesh) : SharedFix(lmp, narg, arg), ranks_(world) {
-  if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag || !atom->torque_flag)
-    fail(std::string("atoms have no radius, mass, spin or torque of their own; use ") + sphere_style);
+  only_spheres("it knows");
   if (!atom->tag_enable) fail("atoms have no numbers; use atom_modify id yes");
   checked([&] { impacts_ = std::make_unique<Coupling>(read_command({arg + std::min(3, narg), arg + narg}, atom->ntypes, mesh)); });
   restart_global = 1;
@@ -40,8 +39,8 @@ void ImpactFix::on_first(const std::function<void()>& work) {
 }
 
 void ImpactFix::init() {
-  if (!begins_with(update->integrate_style, "verlet"))
-    fail(std::string("run_style ") + update->integrate_style + " is not supported; use run_style verlet");
+  only_verlet();
+  only_coherent_units();
   if (domain->triclinic) fail("a triclinic box is not supported; use an orthogonal one");
   only_single_grains("it knows");
   check_order();
@@ -172,13 +171,11 @@ void ImpactFix::write_restart(FILE* file) {
   keep_end_of_step();
   if (!ranks_.is_here()) return;
   const std::vector<double> state = impacts_->state();
-  const double count = double(state.size() + 1);
-  write_part(file, {{&count, sizeof count}, {state.data(), state.size() * sizeof(double)}});
+  write_part(file, {{state.data(), state.size() * sizeof(double)}});
 }
 
 void ImpactFix::restart(char* buffer) {
-  const double* const numbers = reinterpret_cast<const double*>(buffer);  // the engine hands over the numbers without their size
-  checked([&] { impacts_->restore({numbers + 1, numbers + std::size_t(numbers[0])}); });
+  checked([&] { impacts_->restore(SavedPart(buffer).rest<double>()); });
 }
 
 }  // namespace dembark_family

@@ -13,9 +13,9 @@ namespace capillary = dembark::capillary;
 namespace dembark_family {
 namespace {
 
-std::string words(double value) {
+std::string digits(double value) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
+  std::snprintf(text, sizeof text, "%.10g", value);
   return text;
 }
 
@@ -52,6 +52,11 @@ LiquidFix::~LiquidFix() {
   atom->delete_callback(id, on_restart);
 }
 
+std::string LiquidFix::amount(double volume) const {
+  const std::string units = update->unit_style;
+  return digits(volume) + (units == "si" ? " m^3" : units == "cgs" ? " cm^3" : "");
+}
+
 void LiquidFix::init() {
   if (force->newton_pair) fail("newton must be off: each rank settles the contacts of the grains that it owns");
   only_verlet();
@@ -63,7 +68,7 @@ void LiquidFix::take_walls(const std::vector<std::string>& names) {
     if (!there(name)) fail("there is no " + wall_style_ + " " + name + walls_with_);
   unmet_.clear();
   for (const capillary::LiquidWall& wall : ledger_.walls)
-    if (!there(wall.name) && wall.pool > 0.0) warn("wall " + wall.name + " is gone, and with it " + words(wall.pool) + " m^3 of liquid");
+    if (!there(wall.name) && wall.pool > 0.0) warn("wall " + wall.name + " is gone, and with it " + amount(wall.pool) + " of liquid");
   ledger_.change_walls(names, grains());
 }
 
@@ -97,14 +102,17 @@ void LiquidFix::pre_force(int) {
 void LiquidFix::after_new_list() {
   const auto grain = [this](int i) { return "grain " + std::to_string(atom->tag[i]); };
   const int wrong = ledger_.admit(grains(), [this](int i) { return content_.of(atom->radius[i]); });
-  if (wrong >= 0) fail_alone(grain(wrong) + " has liquid " + words(grains().volume[wrong]) + " m^3; it must be >= 0");
+  if (wrong >= 0) fail_alone(grain(wrong) + " has liquid " + amount(grains().volume[wrong]) + "; it must be >= 0");
   double excess = 0.0;
   const int full = ledger_.reconcile_pairs(grains(), [this](const auto& visit) { each_pair_bridge(visit); }, excess);
   if (full >= 0)
-    fail_alone("the bridges of " + grain(full) + " hold " + words(excess) +
-               " more than was given to them; is the box smaller than two cut-offs?");
+    fail_alone("the bridges of " + grain(full) + " hold " + amount(excess) +
+               " more than it gave to them: it may touch a grain and an image of it; is the box smaller than two cut-offs?");
   const double missing = ledger_.audit(grains(), !update->setupflag && update->ntimestep > update->firststep);
-  if (missing != 0.0) fail(words(missing) + " of the liquid is missing");
+  if (missing != 0.0)
+    fail("there is " + amount(ledger_.expected) + " of liquid, and " + amount(ledger_.expected + missing) +
+         " is due: the liquid of grains was changed during the run; look for fixes and commands that set it or that delete and create "
+         "grains in one step");
 }
 
 void LiquidFix::end_of_step() {
@@ -188,7 +196,7 @@ void LiquidFix::write_restart(FILE* file) {
 
 /// init() finds the fixes of the walls.
 void LiquidFix::restart(char* buffer) {
-  checked([&] { restore_liquid(ledger_, buffer); });
+  checked([&] { restore_liquid(ledger_, SavedPart(buffer).text()); });
   ledger_.resize(std::size_t(atom->nmax));
 }
 

@@ -77,6 +77,8 @@ class LiquidFix : public SharedFix {
   /// Ends the run where a bridge that forms is longer than the lists look.
   virtual void check_reach(const Request& request, double rupture_distance) const = 0;
 
+  /// With its unit, for messages.
+  std::string amount(double volume) const;
   void after_new_list();
   double count_bridges() const;
 

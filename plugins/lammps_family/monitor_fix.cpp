@@ -7,6 +7,8 @@
 #include "neigh_list.h"
 #include "neighbor.h"
 
+#include "energy_account_fix.h"
+
 using namespace LAMMPS_NS;
 using dembark::MonitorRun;
 using dembark::ShadowImpact;
@@ -35,8 +37,8 @@ int MonitorFix::setmask() { return FixConst::END_OF_STEP | (run_.impacts > 0 ? F
 
 void MonitorFix::init() {
   only_verlet();
-  if (!has_coherent_units()) fail("units must be si or cgs");
-  if (!has_spheres()) fail(std::string("it judges spheres only: ") + sphere_style);
+  only_coherent_units();
+  only_spheres("it judges");
   find_movers("it judges");
   want_movers();
   find_contacts();
@@ -78,9 +80,9 @@ void MonitorFix::end_of_step() {
 void MonitorFix::take_bodies(long n) {
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!(atom->mask[i] & groupbit) || !follows_forces(i)) continue;
-    const double *const f = atom->f[i], *const torque = atom->torque[i], its = inertia(i);
+    const double *const f = atom->f[i], *const torque = atom->torque[i], inertia_factor = inertia(i);
     const double radius = atom->radius[i], per_mass = 1.0 / atom->rmass[i];
-    const double per_inertia = its > 0.0 ? per_mass / (its * radius * radius) : 0.0;
+    const double per_inertia = inertia_factor > 0.0 ? per_mass / (inertia_factor * radius * radius) : 0.0;
     dembark::AccelerationHistory past;
     std::memcpy(static_cast<void*>(&past), history(i), sizeof past);
     run_.monitor.take(
@@ -191,7 +193,8 @@ void MonitorFix::take_step() {
 double MonitorFix::compute_vector(int n) {
   if (n != MonitorRun::energy_error) return run_.figure(n, long(update->ntimestep));
   if (!account_) return 0.0;
-  const double step_error = account_->compute_vector(15), turned_over = account_->compute_vector(16);
+  const double step_error = account_->compute_vector(EnergyAccountFix::place("step_error"));
+  const double turned_over = account_->compute_vector(EnergyAccountFix::place("scale"));
   return turned_over > 0.0 ? step_error / turned_over : 0.0;
 }
 
@@ -203,13 +206,11 @@ void MonitorFix::write_restart(FILE* file) {
   MPI_Gather(&mine, int(sizeof mine), MPI_BYTE, all.data(), int(sizeof mine), MPI_BYTE, 0, world);
   if (comm->me != 0) return;
   const std::vector<double> saved = run_.saved(all);
-  const double count = double(saved.size() + 1);
-  write_part(file, {{&count, sizeof count}, {saved.data(), saved.size() * sizeof(double)}});
+  write_part(file, {{saved.data(), saved.size() * sizeof(double)}});
 }
 
 void MonitorFix::restart(char* buffer) {
-  const double* const numbers = reinterpret_cast<const double*>(buffer);  // the engine hands over the numbers without their size
-  checked([&] { run_.restore({numbers + 1, numbers + std::size_t(numbers[0])}, comm->me, comm->nprocs); });
+  checked([&] { run_.restore(SavedPart(buffer).rest<double>(), comm->me, comm->nprocs); });
 }
 
 }  // namespace dembark_family

@@ -97,10 +97,25 @@ void ResumeFix::keep_state() const {
   }
 }
 
-void ResumeFix::resume_outputs(bool exact) {
-  for (int k = 0; k < output->ndump; ++k) output->last_dump[k] = update->ntimestep;
-  cut_step_ = update->ntimestep;
-  cut_exactly_ = exact;
+std::string ResumeFix::why_not_put_back(bool fits) const {
+  if (!lacking_.empty()) return lacking_;
+  if (update->ntimestep != state_step_) return "the run does not begin at the step of the state, " + std::to_string(state_step_);
+  if (saved_ranks_ != comm->nprocs)
+    return "the state is of " + std::to_string(saved_ranks_) + " ranks, the run has " + std::to_string(comm->nprocs);
+  int here = fits, all = 0;
+  MPI_Allreduce(&here, &all, 1, MPI_INT, MPI_MIN, world);
+  return all ? "" : "the atoms or their candidates for contacts are others than in the state";
+}
+
+void ResumeFix::go_on(const std::string& why_approximate) {
+  cut_exactly_ = why_approximate.empty();
+  if (update->ntimestep == state_step_) {
+    for (int k = 0; k < output->ndump; ++k) output->last_dump[k] = update->ntimestep;
+    cut_step_ = update->ntimestep;
+  }
+  say("dembark: resumed at step " + std::to_string(update->ntimestep) + (cut_exactly_ ? " exactly" : " approximately: ") + why_approximate +
+      "\n");
+  state_step_ = -1;
 }
 
 void ResumeFix::keep_unappendable() const {
@@ -130,19 +145,18 @@ void ResumeFix::say(const std::string& line) const {
     if (comm->me == 0 && to) std::fputs(line.c_str(), to);
 }
 
-states::State find_state(const std::string& base, Comm& comm, MPI_Comm world) {
+states::State find_state(int narg, char** arg, Comm& comm, Error* error, MPI_Comm world) {
+  if (narg != 1) error->all(FLERR, "resume_state: it must have the form resume_state BASE");
   states::State state;
-  if (comm.me == 0) state = states::newest_state(base);
+  if (comm.me == 0) state = states::newest_state(arg[0]);
   MPI_Bcast(&state, sizeof state, MPI_BYTE, 0, world);
+  const std::string none = std::string("resume_state: there is no whole state ") + arg[0] +
+                           ".<step>.restart in this folder; write states first (fix resume/exact, restart_every > 0 in dembark's decks)";
+  if (state.step < 0) error->all(FLERR, none.c_str());
   int* const wanted = comm.user_procgrid;
   if (state.grid[0] * state.grid[1] * state.grid[2] == comm.nprocs && !wanted[0] && !wanted[1] && !wanted[2])
     std::copy(state.grid, state.grid + 3, wanted);
   return state;
-}
-
-std::string no_state(const std::string& base) {
-  return "resume_state: there is no whole state " + base +
-         ".<step>.restart in this folder; write states first (fix resume/exact, restart_every > 0 in dembark's decks)";
 }
 
 }  // namespace dembark_family

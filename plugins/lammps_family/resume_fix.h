@@ -18,11 +18,6 @@
 
 namespace dembark_family {
 
-/// A fix style that goes on exactly from a state, and why.
-struct ExactFix {
-  const char *style, *why;
-};
-
 /// Which atoms in which order, and their candidates for contacts in which order.
 class OrderHash {
  public:
@@ -57,14 +52,20 @@ class ResumeFix : public SharedFix {
   dembark::restart::RunRecord record() const;
   /// Why a run that goes on from the state that was read is not exact, or nothing. On the first rank.
   std::string why_approximate(const dembark::restart::RunRecord& run) const;
-  /// Output of the step of the state was written before the state. `exact`: what comes behind the step will be the same again.
-  void resume_outputs(bool exact);
+  /// Why forces of the state are not those of this run, or nothing. `fits`: those of this rank belong to its atoms. Collective.
+  std::string why_not_put_back(bool fits) const;
+  /// From the step of the state the run goes on exactly, or approximately. Output of that step was written before the state.
+  void go_on(const std::string& why_approximate);
   /// The engine cannot append to binary and compressed files: those of the run before keep what they have, under another name. On the first
   /// rank, before dumps open their files.
   void keep_unappendable() const;
   void say(const std::string& line) const;
 
+  static constexpr const char* other_version = "the state was written by another version of dembark";
+
   LAMMPS_NS::bigint every_ = 0, state_step_ = -1;  // the step of the state that the run goes on from, -1: none
+  int saved_ranks_ = 0;                            // that wrote it
+  std::string lacking_;                            // why there are no forces to put back
   std::string base_;
   std::vector<std::string> outputs_;
   dembark::restart::RunRecord saved_;  // of the state that was read
@@ -75,11 +76,12 @@ class ResumeFix : public SharedFix {
 
   virtual void write_state() = 0;        ///< Collective.
   virtual bool keeps_order() const = 0;  ///< a state waits to be put back, and the set-up is not to sort the atoms
-  /// Why `fix` does not go on exactly from a state of `step`; nothing if it does.
-  virtual std::string inexact_fix(Fix& fix, LAMMPS_NS::bigint step) const = 0;
+  /// Why a fix of the list does not go on exactly with its arguments, at any step; nothing if it does.
+  virtual std::string inexact_arguments(Fix& fix) const = 0;
   /// Names and formulas of the variables of the script.
   virtual std::vector<std::pair<std::string, std::string>> formulas() const = 0;
   virtual void add_facts(dembark::restart::RunRecord&) const {}
+  std::string inexact_fix(Fix& fix, LAMMPS_NS::bigint step) const;
   std::vector<std::string> inexact(LAMMPS_NS::bigint step) const;
   void refuse_other_states() const;
   void announce_approximate() const;
@@ -91,10 +93,9 @@ class ResumeFix : public SharedFix {
   bool cut_exactly_ = false;
 };
 
-/// The newest whole state, as the first rank finds it; step -1: there is none, which no_state() tells. The grid of processors becomes that
-/// of the state, unless the script has one or there are others. Collective.
-dembark::restart::State find_state(const std::string& base, LAMMPS_NS::Comm& comm, MPI_Comm world);
-std::string no_state(const std::string& base);
+/// The newest complete state, for the command resume_state with its arguments, as the first rank finds it. The grid of processors becomes
+/// that of the state, unless the script has one or there are others. Collective.
+dembark::restart::State find_state(int narg, char** arg, LAMMPS_NS::Comm& comm, LAMMPS_NS::Error* error, MPI_Comm world);
 
 }  // namespace dembark_family
 

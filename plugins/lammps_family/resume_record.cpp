@@ -1,11 +1,12 @@
 // What fix resume/exact compares between the run that wrote a state and the run that goes on, and which of its fixes go on exactly.
+#include <algorithm>
 #include <cctype>
-#include <cstdlib>
 #include <cstring>
 
 #include "group.h"
 #include "neighbor.h"
 
+#include "exact_fixes.h"
 #include "resume_fix.h"
 
 using namespace LAMMPS_NS;
@@ -17,27 +18,44 @@ namespace {
 /// Whether a pair style writes its settings into restart files, and nothing else. LAMMPS's granular also counts how often it was set.
 bool writes_settings(const std::string& pair_style) { return pair_style == "gran" || pair_style == "sph/coupled"; }
 
-std::string pair_settings(Pair* pair) {
-  char* text = nullptr;
-  std::size_t size = 0;
-  FILE* const file = open_memstream(&text, &size);
-  if (!file) return "";
-  pair->write_restart(file);
-  std::fclose(file);
-  const std::string settings(text, size);
-  std::free(text);
-  return settings;
+/// Fixes of both engines that go on exactly from a state, and why. docs/how-to/restarts.md lists them with those of exact_fixes.h; a test
+/// compares.
+constexpr const char* shared_exact_fixes[][2] = {
+    {"addforce", "keeps nothing"},
+    {"capillary/liquid", "its liquid is in the restart file"},
+    {"drag", "keeps nothing"},
+    {"energy/account", "its sums are in the restart file"},
+    {"enforce2d", "keeps nothing"},
+    {"freeze", "keeps nothing"},
+    {"gravity", "keeps nothing; its acceleration is compared"},
+    {"integration/monitor", "its counts and past accelerations are in the restart file"},
+    {"lcp/impact", "its contacts are in the restart file"},
+    {"lineforce", "keeps nothing"},
+    {"momentum", "keeps nothing"},
+    {"move", "the positions and the step that it starts from are in the restart file"},
+    {"nve", "keeps nothing"},
+    {"nve/sphere", "keeps nothing"},
+    {"planeforce", "keeps nothing"},
+    {"print", "keeps nothing"},
+    {"resume/exact", "this fix"},
+    {"setforce", "keeps nothing"},
+    {"viscous", "keeps nothing"},
+};
+
+template <std::size_t count>
+bool lists(const char* const (&fixes)[count][2], const std::string& style) {
+  return std::any_of(fixes, fixes + count, [&](const auto& exact) { return style == exact[0]; });
 }
 
-/// Words of formulas whose value depends on what was drawn before, on where the run began, or on the machine.
-const char* const words_with_a_past[] = {"random",  "normal",   "ramp", "vdisplace", "swiggle", "cwiggle",
-                                         "elapsed", "elaplong", "cpu",  "tpcpu",     "spcpu",   "cpuremain"};
+/// Functions and words of formulas whose value depends on what was drawn before, on where the run began, or on the machine.
+const char* const functions_with_memory[] = {"random",  "normal",   "ramp", "vdisplace", "swiggle", "cwiggle",
+                                             "elapsed", "elaplong", "cpu",  "tpcpu",     "spcpu",   "cpuremain"};
 
-std::string word_with_a_past(const std::string& formula) {
+std::string function_with_memory(const std::string& formula) {
   const auto in_word = [&](std::size_t k) {
     return k < formula.size() && (std::isalnum(static_cast<unsigned char>(formula[k])) || formula[k] == '_');
   };
-  for (const char* const word : words_with_a_past)
+  for (const char* const word : functions_with_memory)
     for (std::size_t at = formula.find(word); at != std::string::npos; at = formula.find(word, at + 1))
       if (!(at > 0 && in_word(at - 1)) && !in_word(at + std::strlen(word))) return word;
   return "";
@@ -89,9 +107,17 @@ states::RunRecord ResumeFix::record() const {
   add_facts(run);
   if (comm->me != 0) return run;
   if (force->pair && writes_settings(word(force->pair_style)))
-    add("settings of the pair style", states::hashed(pair_settings(force->pair)));
+    add("settings of the pair style", states::hashed(written([this](FILE* file) { force->pair->write_restart(file); })));
   run.files = states::output_files(outputs_);
   return run;
+}
+
+/// Why `fix` does not go on exactly from a state of `step`; nothing if it does.
+std::string ResumeFix::inexact_fix(Fix& fix, bigint step) const {
+  if (!lists(shared_exact_fixes, fix.style) && !lists(dembark_engine::exact_fixes, fix.style)) return "begins anew or differently";
+  const std::string why = inexact_arguments(fix);
+  if (!why.empty() || !is(fix, "ave/time") || step % fix.global_freq == 0) return why;
+  return "is within an interval at step " + std::to_string(step);
 }
 
 /// Fixes and variables that do not go on from a state of `step`, each with its reason.
@@ -101,7 +127,7 @@ std::vector<std::string> ResumeFix::inexact(bigint step) const {
     if (const std::string why = inexact_fix(*fix, step); !why.empty())
       all.push_back(std::string("fix ") + fix->id + " (" + fix->style + ") " + why);
   for (const auto& [name, formula] : formulas())
-    if (const std::string word = word_with_a_past(formula); !word.empty()) all.push_back("variable " + name + " uses " + word);
+    if (const std::string word = function_with_memory(formula); !word.empty()) all.push_back("variable " + name + " uses " + word);
   return all;
 }
 

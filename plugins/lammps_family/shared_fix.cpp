@@ -1,10 +1,54 @@
 #include "shared_fix.h"
 
+#include <climits>
+#include <cstdlib>
 #include <cstring>
+#include <stdexcept>
 
 using namespace LAMMPS_NS;
 
 namespace dembark_family {
+
+std::string units_error(const Force& force, const Update& update) {
+  if (force.ftm2v == 1.0 && force.mvv2e == 1.0) return "";
+  return std::string("in units ") + update.unit_style +
+         " force is not mass times acceleration, and the laws need that; use units si, cgs, micro, nano or lj";
+}
+
+std::string run_style_error(const Update& update) {
+  const std::string style = update.integrate_style;
+  if (style == "verlet" || style.rfind("verlet/kk", 0) == 0) return "";
+  return "run_style " + style + " is not supported; use run_style verlet";
+}
+
+SavedPart::SavedPart(const char* buffer) : at_(buffer + head) {
+  std::uint64_t size = 0;
+  if (std::memcmp(buffer, format, sizeof format - 1) != 0) refuse();
+  std::memcpy(&size, buffer + sizeof format - 1, sizeof size);
+  left_ = std::size_t(size);
+}
+
+void SavedPart::refuse() {
+  throw std::runtime_error(
+      "this restart file was written by another version of dembark; go on with that version, or give the fix another ID, with which it "
+      "begins anew");
+}
+
+void SavedPart::take(void* to, std::size_t bytes) {
+  if (bytes > left_) refuse();
+  if (bytes > 0) std::memcpy(to, at_, bytes);
+  at_ += bytes;
+  left_ -= bytes;
+}
+
+std::string SavedPart::text() {
+  const void* const zero = std::memchr(at_, 0, left_);
+  if (!zero) refuse();
+  const std::string found = at_;
+  at_ += found.size() + 1;
+  left_ -= found.size() + 1;
+  return found;
+}
 
 std::vector<Fix*> SharedFix::fixes() const {
   std::vector<Fix*> all;
@@ -26,7 +70,15 @@ void SharedFix::only_one() const {
 }
 
 void SharedFix::only_verlet() const {
-  if (!is_verlet(*update)) fail("only run_style verlet is supported");
+  if (const std::string wrong = run_style_error(*update); !wrong.empty()) fail(wrong);
+}
+
+void SharedFix::only_coherent_units() const {
+  if (const std::string wrong = units_error(*force, *update); !wrong.empty()) fail(wrong);
+}
+
+void SharedFix::only_spheres(const std::string& does) const {
+  if (!has_spheres()) fail(does + " spheres only; use " + sphere_style);
 }
 
 void SharedFix::only_single_grains(const std::string& does) const {
@@ -34,11 +86,29 @@ void SharedFix::only_single_grains(const std::string& does) const {
     if (moves_clusters(*fix)) fail(does + " single grains, and fix " + fix->id + " (" + fix->style + ") moves bodies made of several");
 }
 
-void SharedFix::write_part(FILE* file, const std::vector<std::pair<const void*, std::size_t>>& pieces) {
-  int bytes = 0;
-  for (const auto& [data, size] : pieces) bytes += int(size);
+void SharedFix::write_part(FILE* file, const Pieces& pieces) const {
+  std::uint64_t size = 0;
+  for (const auto& piece : pieces) size += piece.second;
+  if (size > INT_MAX - SavedPart::head)
+    fail_alone("it has " + std::to_string(size) + " bytes for the restart file, and the engine stores up to 2 GiB of a fix");
+  const int bytes = int(SavedPart::head + size);
   fwrite(&bytes, sizeof bytes, 1, file);
-  for (const auto& [data, size] : pieces) fwrite(data, 1, size, file);
+  fwrite(SavedPart::format, 1, sizeof SavedPart::format - 1, file);
+  fwrite(&size, sizeof size, 1, file);
+  for (const auto& [data, length] : pieces) fwrite(data, 1, length, file);
+  if (std::fflush(file) != 0 || std::ferror(file)) fail_alone("the restart file cannot be written; is the disk full?");
+}
+
+std::string SharedFix::written(const std::function<void(FILE*)>& write) {
+  char* text = nullptr;
+  std::size_t size = 0;
+  FILE* const file = open_memstream(&text, &size);
+  if (!file) return "";
+  write(file);
+  std::fclose(file);
+  std::string all(text, size);
+  std::free(text);
+  return all;
 }
 
 const double* SharedFix::restart_row(int i, int nth) const {
@@ -58,7 +128,7 @@ void GrainFix::find_movers(const std::string& does) {
     if (is(*fix, "nve/sphere")) movers_.emplace_back(fix->groupbit, inertia_of(*fix));
     if (is(*fix, "nve")) movers_.emplace_back(fix->groupbit, 0.0);
   }
-  for (const auto& [group, its] : movers_) moving_ |= group;
+  for (const auto& mover : movers_) moving_ |= mover.first;
 }
 
 void GrainFix::want_movers() const {

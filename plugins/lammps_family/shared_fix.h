@@ -4,10 +4,12 @@
 #define DEMBARK_SHARED_FIX_H
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <functional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -40,11 +42,49 @@ inline dembark::ContactBodies grain_pair(const LAMMPS_NS::Atom& atom, int i, int
   return b;
 }
 
-/// J, kg, m and s are the engine's units, or those of a system like theirs.
-inline bool has_coherent_units(const LAMMPS_NS::Force& force) { return force.ftm2v == 1.0 && force.mvv2e == 1.0; }
+/// What is wrong with units in which the laws do not hold as they are written, or nothing.
+std::string units_error(const LAMMPS_NS::Force& force, const LAMMPS_NS::Update& update);
+/// What is wrong with run styles whose steps have more than one length, or nothing.
+std::string run_style_error(const LAMMPS_NS::Update& update);
 
-/// Steps have one length. Accelerators have their own names behind `verlet`.
-inline bool is_verlet(const LAMMPS_NS::Update& update) { return std::string(update.integrate_style).rfind("verlet", 0) == 0; }
+/// A fix's part of a restart file, piece by piece, as SharedFix::write_part() wrote it. The engine hands back its bytes without their
+/// number: they begin with a word for their format and with their size. Another format or size is thrown as std::runtime_error.
+class SavedPart {
+ public:
+  /// To be changed when a fix changes what it writes.
+  static constexpr char format[9] = "dembark1";
+  static constexpr std::size_t head = sizeof(std::uint64_t) + sizeof format - 1;
+
+  explicit SavedPart(const char* buffer);
+  template <class T>
+  void read(T* values, std::size_t count = 1) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    take(values, count * sizeof(T));
+  }
+  /// All that is left.
+  template <class T>
+  std::vector<T> rest() {
+    std::vector<T> values(left_ / sizeof(T));
+    read(values.data(), values.size());
+    end();
+    return values;
+  }
+  /// Up to a zero.
+  std::string text();
+  void end() const {
+    if (left_ != 0) refuse();
+  }
+
+ private:
+  [[noreturn]] static void refuse();
+  void take(void* to, std::size_t bytes);
+
+  const char* at_;
+  std::size_t left_ = 0;
+};
+
+/// Where bytes are, and how many.
+typedef std::vector<std::pair<const void*, std::size_t>> Pieces;
 
 class SharedFix : public dembark_engine::EngineFix {
  public:
@@ -59,9 +99,11 @@ class SharedFix : public dembark_engine::EngineFix {
   Fix* fix_of_style(const char* style) const;
   void only_one() const;
   void only_verlet() const;
+  void only_coherent_units() const;
+  /// `does`: what this fix does with them, for messages.
+  void only_spheres(const std::string& does) const;
   /// Ends the run where a fix moves bodies made of several grains. `does`: what this fix does with single grains, for messages.
   void only_single_grains(const std::string& does) const;
-  bool has_coherent_units() const { return dembark_family::has_coherent_units(*force); }
 
   /// What `work` returns; what it throws ends the run with its line.
   template <class Work>
@@ -75,8 +117,10 @@ class SharedFix : public dembark_engine::EngineFix {
     fail(wrong);
   }
 
-  /// This fix's part of a restart file, which the first rank writes.
-  static void write_part(FILE* file, const std::vector<std::pair<const void*, std::size_t>>& pieces);
+  /// This fix's part of a restart file, which the first rank writes and SavedPart reads.
+  void write_part(FILE* file, const Pieces& pieces) const;
+  /// What `write` writes to a file.
+  static std::string written(const std::function<void(FILE*)>& write);
   /// Of an atom, behind what other fixes have there; the first number is how many there are.
   const double* restart_row(int i, int nth) const;
 };
@@ -98,8 +142,8 @@ class GrainFix : public SharedFix {
   bool follows_forces(int i) const { return (atom->mask[i] & moving_) && !(atom->mask[i] & frozen_); }
   /// Moment of inertia over m r^2 of a grain that follows its forces; 0 if it does not turn.
   double inertia(int i) const {
-    for (const auto& [group, its] : movers_)
-      if (atom->mask[i] & group) return its;
+    for (const auto& [group, inertia_factor] : movers_)
+      if (atom->mask[i] & group) return inertia_factor;
     return 0.0;
   }
 

@@ -56,17 +56,13 @@ inline dembark::ContactBodies bodies(const LIGGGHTS::ContactModels::SurfacesClos
 /// Adds an assembled force to what acts on the two bodies.
 inline void add_force(const dembark::ContactForce& f, const LIGGGHTS::ContactModels::SurfacesCloseData& d,
                       LIGGGHTS::ContactModels::ForceData& on_i, LIGGGHTS::ContactModels::ForceData& on_j) {
-  const auto add = [](double* to, double scale, const Vec3& v) {
-    to[0] += scale * v.x;
-    to[1] += scale * v.y;
-    to[2] += scale * v.z;
-  };
+  using dembark_family::add;
   const double scale = d.is_wall ? d.area_ratio : 1.0;
-  add(on_i.delta_F, scale, f.force);
-  add(on_i.delta_torque, scale, f.torque_1);
+  add(on_i.delta_F, f.force, scale);
+  add(on_i.delta_torque, f.torque_1, scale);
   if (d.is_wall) return;
-  add(on_j.delta_F, -1.0, f.force);
-  add(on_j.delta_torque, 1.0, f.torque_2);
+  add(on_j.delta_F, f.force, -1.0);
+  add(on_j.delta_torque, f.torque_2);
 }
 
 using dembark::load_friction;

@@ -1,7 +1,5 @@
 #include "fix_nve_sph_coupled.h"
 
-#include <cstring>
-
 #include "atom.h"
 #include "comm.h"
 #include "fix_property_atom.h"
@@ -20,7 +18,7 @@ using dembark_family::vector;
 
 FixNveSphCoupled::FixNveSphCoupled(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
   if (narg != 3) fail("it takes no keywords: all numbers stand in pair_style sph/coupled");
-  if (!PairSphCoupled::find(force)) fail("it wants pair_style sph/coupled, alone or in hybrid/overlay, before it");
+  if (!PairSphCoupled::find(force)) fail(PairSphCoupled::missing);
   time_integrate = 1;
   restart_global = 1;
   vector_flag = 1;
@@ -45,7 +43,7 @@ int FixNveSphCoupled::setmask() { return INITIAL_INTEGRATE | PRE_FORCE | FINAL_I
 
 void FixNveSphCoupled::init() {
   pair_ = PairSphCoupled::find(force);
-  if (!pair_) fail("it wants pair_style sph/coupled, alone or in hybrid/overlay");
+  if (!pair_) fail(PairSphCoupled::missing);
   if (bool(shifts_) != (pair_->fluid().shifting.coefficient > 0.0)) fail("it must come after pair_style sph/coupled ... shifting");
   double count = 0.0, all = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) count += (atom->mask[i] & groupbit) != 0;
@@ -117,6 +115,10 @@ void FixNveSphCoupled::write_restart(FILE *file) {
 }
 
 void FixNveSphCoupled::restart(char *buffer) {
-  std::memcpy(saved_, buffer, sizeof saved_);
+  checked([&] {
+    dembark_family::SavedPart part(buffer);
+    part.read(saved_, 3);
+    part.end();
+  });
   first_ = false;
 }

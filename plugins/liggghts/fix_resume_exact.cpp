@@ -1,6 +1,7 @@
 #include "fix_resume_exact.h"
 
 #include <algorithm>
+#include <climits>
 #include <cstring>
 #include <fstream>
 #include <numeric>
@@ -25,16 +26,16 @@
 #include "write_restart.h"
 
 #include "engine_access.h"
-#include "exact_fixes.h"
 
 using namespace LAMMPS_NS;
 using namespace FixConst;
 
 namespace {
 
-constexpr double format = 4.0;
-// Format, step, ranks, contact distance factor; then how many numbers each rank has, their hashes, and the record of the run as text.
-constexpr int header = 4;
+// Then come how many numbers each rank has, their hashes, and the record of the run as text.
+struct Head {
+  double step, ranks, contact_distance_factor;
+};
 
 /// FNV-1a, 64 bits at a time.
 std::uint64_t hash_of(const std::vector<double> &numbers) {
@@ -144,24 +145,13 @@ int FixResumeExact::setmask() { return PRE_INITIAL_INTEGRATE | PRE_EXCHANGE | PR
 
 void FixResumeExact::setup(int) {
   if (state_step_ < 0) return;
-  std::string why;
-  if (update->ntimestep != state_step_) why = "the run does not begin at the step of the state";
-  else if (!lacking_.empty()) why = lacking_;
-  else if (saved_ranks_ != comm->nprocs)
-    why = "the state is of " + std::to_string(saved_ranks_) + " ranks, the run has " + std::to_string(comm->nprocs);
-  else {
-    const std::vector<double> facts = structure(atom, force, modify);
-    int fits = part_.size() > facts.size() && std::equal(facts.begin(), facts.end(), part_.begin()), all = 0;
-    MPI_Allreduce(&fits, &all, 1, MPI_INT, MPI_MIN, world);
-    if (all) visit({part_, true, facts.size()}, atom, force, modify);
-    else why = "the atoms or their candidates for contacts are others than in the state";
-  }
+  const std::vector<double> facts = structure(atom, force, modify);
+  std::string why = why_not_put_back(part_.size() > facts.size() && std::equal(facts.begin(), facts.end(), part_.begin()));
+  if (why.empty()) visit({part_, true, facts.size()}, atom, force, modify);
   const std::string differences = why_approximate(record());
   if (!differences.empty()) why += (why.empty() ? "" : "; ") + differences;
-  if (update->ntimestep == state_step_) resume_outputs(why.empty());
-  say("dembark: resumed at step " + std::to_string(update->ntimestep) + (why.empty() ? " exactly" : " approximately: ") + why + "\n");
+  go_on(why);
   part_ = {};
-  state_step_ = -1;
 }
 
 void FixResumeExact::write_state() {
@@ -170,17 +160,19 @@ void FixResumeExact::write_state() {
   record_ = record().text();
   part_ = structure(atom, force, modify);
   visit({part_, false}, atom, force, modify);
+  if (part_.size() > INT_MAX)
+    fail_alone("a rank has " + std::to_string(part_.size()) + " numbers, and MPI sends up to 2^31; take more ranks");
   const std::uint64_t hash = hash_of(part_);
   MPI_Gather(&hash, 1, MPI_UINT64_T, hashes_.data(), 1, MPI_UINT64_T, 0, world);
   const double mine = double(part_.size());
   MPI_Gather(&mine, 1, MPI_DOUBLE, lengths_.data(), 1, MPI_DOUBLE, 0, world);
   std::string path = part_path();
   WriteRestart(lmp).write(&path[0]);
-  const bool whole = append_parts(path);
+  const bool complete = append_parts(path);
   lengths_.assign(lengths_.size(), 0.0);
   record_.clear();
   if (comm->me != 0) return;
-  if (!whole) fail_alone("file " + path + " could not be written whole. No space left on the disk?");
+  if (!complete) fail_alone("file " + path + " cannot be written; is the disk full?");
   keep_state();
 }
 
@@ -239,46 +231,43 @@ std::string FixResumeExact::read_parts(const double *lengths) {
 /// How long the parts of all ranks are, which write_state() appends; a stock restart file has none.
 void FixResumeExact::write_restart(FILE *file) {
   if (comm->me != 0) return;
-  const double numbers[header] = {format, double(update->ntimestep), double(comm->nprocs), neighbor->contactDistanceFactor};
-  write_part(file, {{numbers, sizeof numbers},
+  const Head head{double(update->ntimestep), double(comm->nprocs), neighbor->contactDistanceFactor};
+  write_part(file, {{&head, sizeof head},
                     {lengths_.data(), lengths_.size() * sizeof lengths_[0]},
                     {hashes_.data(), hashes_.size() * sizeof hashes_[0]},
                     {record_.c_str(), record_.size() + 1}});
 }
 
 void FixResumeExact::restart(char *buffer) {
-  double numbers[header];
-  std::memcpy(numbers, buffer, sizeof numbers);
   state_step_ = update->ntimestep;
-  saved_ranks_ = static_cast<int>(numbers[2]);
-  if (numbers[0] != format) {
-    lacking_ = "the state was written by another version of dembark";
+  Head head{};
+  std::vector<double> lengths;
+  std::vector<std::uint64_t> hashes;
+  try {
+    dembark_family::SavedPart part(buffer);
+    part.read(&head);
+    saved_ranks_ = static_cast<int>(head.ranks);
+    lengths.resize(std::size_t(saved_ranks_));
+    hashes.resize(lengths.size());
+    part.read(lengths.data(), lengths.size());
+    part.read(hashes.data(), hashes.size());
+    saved_ = dembark::restart::RunRecord::read(part.text());
+  } catch (const std::exception &) {
+    lacking_ = other_version;
     return;
   }
   // Models register it when a run begins, by the liquid that there is then.
-  neighbor->register_contact_dist_factor(numbers[3]);
-  const std::size_t ranks = std::size_t(saved_ranks_);
-  std::vector<double> lengths(ranks);
-  std::vector<std::uint64_t> hashes(ranks);
-  buffer += sizeof numbers;
-  std::memcpy(lengths.data(), buffer, ranks * sizeof lengths[0]);
-  buffer += ranks * sizeof lengths[0];
-  std::memcpy(hashes.data(), buffer, ranks * sizeof hashes[0]);
-  saved_ = dembark::restart::RunRecord::read(buffer + ranks * sizeof hashes[0]);
+  neighbor->register_contact_dist_factor(head.contact_distance_factor);
   if (comm->me == 0) keep_unappendable();
-  if (static_cast<bigint>(numbers[1]) != update->ntimestep || saved_ranks_ != comm->nprocs) return;
+  if (static_cast<bigint>(head.step) != update->ntimestep || saved_ranks_ != comm->nprocs) return;
   hashes_ = hashes;
   lacking_ = read_parts(lengths.data());
 }
 
-std::string FixResumeExact::inexact_fix(Fix &fix, bigint step) const {
-  const auto known = std::find_if(std::begin(dembark_liggghts::exact_fixes), std::end(dembark_liggghts::exact_fixes),
-                                  [&](const auto &exact) { return is(fix, exact.style); });
-  if (known == std::end(dembark_liggghts::exact_fixes)) return "begins anew or differently";
+std::string FixResumeExact::inexact_arguments(Fix &fix) const {
   auto *const mean = dynamic_cast<FixAveTime *>(&fix);
   if (!mean) return "";
   if (!dembark_liggghts::is_of_one_interval(*mean)) return "averages over more than one interval";
-  if (step % mean->global_freq != 0) return "is within an interval at step " + std::to_string(step);
   return dembark_liggghts::has_file(*mean) ? "writes its file anew" : "";
 }
 
@@ -304,9 +293,7 @@ void FixResumeExact::add_facts(dembark::restart::RunRecord &run) const {
 double FixResumeExact::memory_usage() { return double(part_.size() * sizeof(double)); }
 
 void ResumeState::command(int narg, char **arg) {
-  if (narg != 1) error->all(FLERR, "resume_state: it must have the form resume_state BASE");
-  const dembark::restart::State state = dembark_family::find_state(arg[0], *comm, world);
-  if (state.step < 0) error->all(FLERR, dembark_family::no_state(arg[0]).c_str());
+  const dembark::restart::State state = dembark_family::find_state(narg, arg, *comm, error, world);
   file[lmp] = dembark::restart::state_name(arg[0], state.step);
   char *words[] = {&file[lmp][0]};
   ReadRestart(lmp).command(1, words);

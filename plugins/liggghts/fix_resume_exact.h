@@ -37,7 +37,7 @@ class FixResumeExact : public dembark_family::ResumeFix {
  private:
   bool keeps_order() const { return !part_.empty(); }
   void write_state();
-  std::string inexact_fix(Fix &fix, bigint step) const;
+  std::string inexact_arguments(Fix &fix) const;
   std::vector<std::pair<std::string, std::string>> formulas() const;
   void add_facts(dembark::restart::RunRecord &run) const;
   bool append_parts(const std::string &path);
@@ -47,8 +47,6 @@ class FixResumeExact : public dembark_family::ResumeFix {
   std::vector<double> lengths_;        // of the parts of all ranks, on the first
   std::vector<std::uint64_t> hashes_;  // of the same
   std::string record_;                 // of the run that writes a state
-  std::string lacking_;                // why there is no part to put back
-  int saved_ranks_ = 0;
 };
 
 class ResumeState : protected Pointers {

@@ -82,7 +82,7 @@ Body read_body(const std::vector<std::string> &words, bool free, int dimension) 
 
 FixSphBody::FixSphBody(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp, narg, arg) {
   const bool free = std::strcmp(arg[2], "sph/body") == 0;
-  if (!PairSphCoupled::find(force)) fail("it wants pair_style sph/coupled, alone or in hybrid/overlay, before it");
+  if (!PairSphCoupled::find(force)) fail(PairSphCoupled::missing);
   state_.body = checked([&] { return read_body(std::vector<std::string>(arg + 3, arg + narg), free, domain->dimension); });
   restart_global = 1;
   vector_flag = 1;
@@ -111,6 +111,7 @@ void FixSphBody::pre_delete(bool unfixed) {
 int FixSphBody::setmask() { return INITIAL_INTEGRATE | PRE_FORCE | FINAL_INTEGRATE; }
 
 void FixSphBody::init() {
+  if (!PairSphCoupled::find(force)) fail(PairSphCoupled::missing);
   double count = 0.0, all = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) count += (atom->mask[i] & groupbit) != 0;
   MPI_Allreduce(&count, &all, 1, MPI_DOUBLE, MPI_SUM, world);
@@ -217,6 +218,10 @@ void FixSphBody::write_restart(FILE *file) {
 }
 
 void FixSphBody::restart(char *buffer) {
-  std::memcpy(static_cast<void *>(&state_), buffer, sizeof state_);
+  checked([&] {
+    dembark_family::SavedPart part(buffer);
+    part.read(&state_);
+    part.end();
+  });
   restarted_ = true;
 }

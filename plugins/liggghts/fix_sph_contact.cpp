@@ -1,7 +1,7 @@
 #include "fix_sph_contact.h"
 
 #include <algorithm>
-#include <cstring>
+#include <stdexcept>
 
 #include "comm.h"
 #include "domain.h"
@@ -101,6 +101,7 @@ void FixSphContact::init() {
     fail("the time step must be at most " + text(most) + " s for this stiffness, not " + text(update->dt) + " s; take a softer one");
   if (slit_pressure_ == 0.0) return;
   PairSphCoupled *const pair = PairSphCoupled::find(force);
+  if (!pair) fail(PairSphCoupled::missing);
   std::vector<LatticePlane> planes;
   for (const ContactPlane &plane : contacts_.planes) planes.push_back({plane.point, plane.normal});
   std::vector<int> numbers;
@@ -129,7 +130,7 @@ void FixSphContact::push(bool remember) {
 /// Energy in the springs (J), largest overlap (m), how many points touch.
 double FixSphContact::compute_vector(int n) { return n == 0 ? contacts_.stored : n == 1 ? contacts_.deepest : double(contacts_.count); }
 
-std::string FixSphContact::written() const {
+std::string FixSphContact::written_boxes() const {
   std::string all;
   for (const std::string &name : names_) all += "box " + name + " ";
   return all + "and " + std::to_string(contacts_.planes.size()) + " planes";
@@ -137,18 +138,15 @@ std::string FixSphContact::written() const {
 
 void FixSphContact::write_restart(FILE *file) {
   if (comm->me != 0) return;
-  static_assert(sizeof(Vector) == 3 * sizeof(double), "numbers only");
-  const std::string of = written();
-  const std::size_t count = contacts_.stretches.size();
-  write_part(file, {{of.c_str(), of.size() + 1}, {&count, sizeof count}, {contacts_.stretches.data(), count * sizeof(Vector)}});
+  const std::string boxes = written_boxes();
+  write_part(file, {{boxes.c_str(), boxes.size() + 1}, {contacts_.stretches.data(), contacts_.stretches.size() * sizeof(Vector)}});
 }
 
 void FixSphContact::restart(char *buffer) {
-  const std::string of = buffer;
-  if (of != written()) fail("the state has contacts of " + of + ", not of " + written());
-  buffer += of.size() + 1;
-  std::size_t count = 0;
-  std::memcpy(&count, buffer, sizeof count);
-  contacts_.stretches.resize(count);
-  std::memcpy(static_cast<void *>(contacts_.stretches.data()), buffer + sizeof count, count * sizeof(Vector));
+  checked([&] {
+    dembark_family::SavedPart part(buffer);
+    if (const std::string boxes = part.text(); boxes != written_boxes())
+      throw std::invalid_argument("the state has contacts of " + boxes + ", not of " + written_boxes());
+    contacts_.stretches = part.rest<Vector>();
+  });
 }

@@ -37,7 +37,7 @@ class FixSphContact : public dembark_family::SharedFix {
   dembark::sph::BoxContacts contacts_;
   double slit_pressure_ = 0.0;
   /// What the stretches of a state belong to.
-  std::string written() const;
+  std::string written_boxes() const;
 
   std::vector<std::string> names_;  // of the fixes of the boxes
   std::vector<class FixSphBody *> fixes_;

@@ -20,7 +20,7 @@ namespace {
 typedef MultiVectorContainer<double, 3, 3> NodeVectors;
 
 /// Global vector: displacement, angle, velocity, rate, acceleration, angular acceleration; force, torque, power, work, impulse.
-constexpr int motion_numbers = 12, all_numbers = 23;
+constexpr int load_numbers = 6, all_numbers = dembark_family::MovingWall::all_numbers + load_numbers;
 
 NodeVectors *velocities(AbstractMesh &mesh) { return mesh.prop().getElementProperty<NodeVectors>("v"); }
 
@@ -34,8 +34,7 @@ FixWallMotion::FixWallMotion(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp,
   mesh_ = fix->mesh();
   if (mesh_->isMoving()) fail("mesh '" + mesh_id_ + "' is moved by another fix already; give all terms of a motion to one fix");
   if (fix->surfaceVel()) fail("mesh '" + mesh_id_ + "' has a surface velocity, and cannot be moved too");
-  for (int k = 5; k < narg; ++k) words_ += (k > 5 ? " " : "") + std::string(arg[k]);
-  motion_ = checked([&] { return dembark::PrescribedMotion(words_); });
+  checked([&] { wall_ = std::make_unique<dembark_family::MovingWall>(std::vector<std::string>(arg + 5, arg + narg)); });
   restart_global = time_depend = 1;
   nevery = global_freq = 1;
   vector_flag = 1;
@@ -43,11 +42,11 @@ FixWallMotion::FixWallMotion(LAMMPS *lmp, int narg, char **arg) : SharedFix(lmp,
   extvector = 0;
 }
 
-void FixWallMotion::post_create() { mesh_->registerMove(false, true, motion_.turns()); }
+void FixWallMotion::post_create() { mesh_->registerMove(false, true, wall_->motion().turns()); }
 
 void FixWallMotion::pre_delete(bool unfixed) {
   if (!unfixed || !modify->find_fix_id(mesh_id_.c_str())) return;
-  mesh_->unregisterMove(false, true, motion_.turns());
+  mesh_->unregisterMove(false, true, wall_->motion().turns());
   if (NodeVectors *const v = velocities(*mesh_)) v->setAll(0.0);
 }
 
@@ -56,15 +55,10 @@ int FixWallMotion::setmask() { return INITIAL_INTEGRATE | PRE_FORCE | END_OF_STE
 
 void FixWallMotion::init() {
   only_verlet();
-  const std::string wrong = motion_.step_error(update->dt);
-  if (!wrong.empty()) fail(wrong);
-  // Displacements are from where the mesh stands when the motion is run first; a restart file has the time of that.
-  clock_.begin(update->atime, long(update->atimestep), long(update->ntimestep), update->dt);
-  checked([&] { motion_.begin(clock_.begun); });
+  checked([&] { wall_->begin(*update); });
   if (static_cast<TriMesh *>(mesh_)->nMove() > 1)
     fail("mesh '" + mesh_id_ + "' is moved by another fix, too; give all terms of a motion to one fix");
   check_turn();
-  state_ = motion_.at(clock_.time(update->ntimestep, update->dt));
   check_reach();
   knows_load_ = walls_tell_loads;
   for (Fix *const each : fixes()) {
@@ -81,7 +75,7 @@ void FixWallMotion::init() {
 void FixWallMotion::check_turn() {
   auto *const mesh = static_cast<TriMesh *>(mesh_);
   for (int k = 0; k < 3; ++k) {
-    if (!domain->periodicity[k] || !motion_.turns_out_of(k)) continue;
+    if (!domain->periodicity[k] || !wall_->motion().turns_out_of(k)) continue;
     int there = 0, any = 0;
     const double room = 1e-6 * domain->prd[k];
     for (int i = 0; i < mesh->sizeLocal(); ++i)
@@ -99,155 +93,101 @@ void FixWallMotion::check_turn() {
 
 /// Centres of triangles must stay in the box, where it is not periodic: the engine loses others in the middle of the run.
 void FixWallMotion::check_reach() {
-  double low[3] = {0.0, 0.0, 0.0}, high[3] = {0.0, 0.0, 0.0};
-  for (int k = 0; k < 3; ++k) {
-    low[k] = 1e300;
-    high[k] = -1e300;
-  }
   auto *const mesh = static_cast<TriMesh *>(mesh_);
+  std::vector<Vec3<double>> middles;
   for (int i = 0; i < mesh->sizeLocal(); ++i) {
     double centre[3];
     mesh->center(i, centre);
-    for (int k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], centre[k]);
-      high[k] = std::max(high[k], centre[k]);
-    }
+    middles.push_back(dembark_family::vector(centre));
   }
-  MPI_Allreduce(MPI_IN_PLACE, low, 3, MPI_DOUBLE, MPI_MIN, world);
-  MPI_Allreduce(MPI_IN_PLACE, high, 3, MPI_DOUBLE, MPI_MAX, world);
-  const double now = clock_.time(update->ntimestep, update->dt);
-  Vec3<double> back, forth;
-  motion_.reach(now, now + double(update->laststep - update->ntimestep) * update->dt, back, forth);
-  back -= state_.displacement;
-  forth -= state_.displacement;
-  const double from[3] = {back.x, back.y, back.z}, to[3] = {forth.x, forth.y, forth.z};
-  for (int k = 0; k < 3; ++k)
-    if (!domain->periodicity[k] && domain->boundary[k][0] != 2 && domain->boundary[k][0] != 3 &&
-        (low[k] + from[k] < domain->boxlo[k] || high[k] + to[k] > domain->boxhi[k]))
-      fail(std::string("the motion takes mesh '") + mesh_id_ + "' out of the box along " + "xyz"[k] + ", from " +
-           dembark::motion::text(low[k] + from[k]) + " to " + dembark::motion::text(high[k] + to[k]) + " m beside " +
-           dembark::motion::text(domain->boxlo[k]) + " ... " + dembark::motion::text(domain->boxhi[k]) +
-           " m: make the amplitude smaller or the box larger");
+  if (const std::string gone = wall_->outside(middles, wall_->state(), *update, *domain, world); !gone.empty())
+    fail("the motion takes mesh '" + mesh_id_ + "' " + gone + "; make the motion smaller or the box larger");
 }
 
-void FixWallMotion::set_velocities(const dembark::WallStep &step) {
+/// The corners have the velocity of the step that led here.
+void FixWallMotion::set_velocities() {
   auto *const mesh = static_cast<TriMesh *>(mesh_);
   double ***const v = velocities(*mesh_)->begin();
-  const Vec3<double> spin = step.rate * motion_.axis(), centre = motion_.centre(state_);
   for (int i = 0; i < mesh->sizeLocal() + mesh->sizeGhost(); ++i)
     for (int k = 0; k < 3; ++k) {
       double node[3];
       mesh->node(i, k, node);
-      const Vec3<double> u = step.velocity + cross(spin, Vec3<double>{node[0], node[1], node[2]} - centre);
+      const Vec3<double> u = wall_->velocity_at(dembark_family::vector(node));
       v[i][k][0] = u.x;
       v[i][k][1] = u.y;
       v[i][k][2] = u.z;
     }
 }
 
-/// Takes up where the wall is at the time t (s), when it is there.
-void FixWallMotion::arrive(double t) {
-  state_ = motion_.at(t);
-  acceleration_ = dembark::wall_acceleration(motion_, t, update->dt);
-}
-
 /// The forces of a set-up see the velocity of the half step before it, too.
 void FixWallMotion::setup_pre_force(int) {
   if (!velocities(*mesh_)) mesh_->prop().addElementProperty<NodeVectors>("v", "comm_exchange_borders", "frame_invariant", "restart_no");
-  const double now = clock_.time(update->ntimestep, update->dt);
-  arrive(now);
-  set_velocities(motion_.step(now - update->dt, update->dt));
+  const double now = wall_->time(update->ntimestep, update->dt);
+  wall_->arrive(now - update->dt, now, update->dt);
+  set_velocities();
   load_ = {};
 }
 
-void FixWallMotion::setup(int) {
-  if (!resumed_) {
-    const dembark::WallLoad load = whole_load();
-    sums_.begin(wall_power(load, state_, motion_.axis()), load.force);
-  }
-  resumed_ = false;
-}
+void FixWallMotion::setup(int) { wall_->begin_sums(total_load()); }
 
 void FixWallMotion::initial_integrate(int) {
-  const double dt = update->dt, from = clock_.time(update->ntimestep - 1, dt), to = clock_.time(update->ntimestep, dt);
-  const dembark::WallState before = state_;
-  arrive(to);
-  if (motion_.turns()) {
-    const Vec3<double> axis = motion_.axis(), centre = motion_.centre(before);
+  const double dt = update->dt, from = wall_->time(update->ntimestep - 1, dt), to = wall_->time(update->ntimestep, dt);
+  const dembark::WallState before = wall_->state();
+  const Vec3<double> centre = wall_->centre();
+  wall_->arrive(from, to, dt);
+  const dembark::WallState &now = wall_->state();
+  if (wall_->motion().turns()) {
+    const Vec3<double> &axis = wall_->motion().axis();
     const double about[] = {axis.x, axis.y, axis.z}, through[] = {centre.x, centre.y, centre.z};
-    if (state_.angle != before.angle) mesh_->rotate(state_.angle - before.angle, about, through);
+    if (now.angle != before.angle) mesh_->rotate(now.angle - before.angle, about, through);
   }
-  const Vec3<double> by = state_.displacement - before.displacement;
+  const Vec3<double> by = now.displacement - before.displacement;
   const double shift[] = {by.x, by.y, by.z};
   mesh_->move(shift);
-  set_velocities(motion_.step(from, dt));
+  set_velocities();
 }
 
 void FixWallMotion::pre_force(int) { load_ = {}; }
 
 void FixWallMotion::add_load(const double *centre, const Vec3<double> &force, const Vec3<double> &torque) {
-  load_.add(Vec3<double>{centre[0], centre[1], centre[2]} - motion_.centre(state_), force, torque);
+  load_.add(dembark_family::vector(centre) - wall_->centre(), force, torque);
 }
 
-/// Collective.
-dembark::WallLoad FixWallMotion::whole_load() {
+/// Of all ranks. Collective.
+dembark::WallLoad FixWallMotion::total_load() {
   dembark::WallLoad all;
-  static_assert(sizeof all == 6 * sizeof(double), "numbers only");
-  MPI_Allreduce(&load_, &all, 6, MPI_DOUBLE, MPI_SUM, world);
+  static_assert(sizeof all == load_numbers * sizeof(double), "numbers only");
+  MPI_Allreduce(&load_, &all, load_numbers, MPI_DOUBLE, MPI_SUM, world);
   return all;
 }
 
-void FixWallMotion::end_of_step() {
-  const dembark::WallLoad load = whole_load();
-  sums_.step(update->dt, wall_power(load, state_, motion_.axis()), load.force);
-}
+void FixWallMotion::end_of_step() { wall_->end_step(total_load(), update->dt); }
 
 /// Collective.
 double FixWallMotion::compute_vector(int n) {
-  if (n >= motion_numbers && !knows_load_)
+  const int of_load = n - dembark_family::MovingWall::state_numbers;
+  if (of_load < 0) return wall_->number(n);
+  if (!knows_load_)
     fail(
         "what the wall does to the grains is known in liggghts-dembark only, with 'tangential finnie_rabinowicz' or 'cohesion capillary' "
         "in its fix wall/gran");
-  const dembark::WallLoad load = n >= motion_numbers ? whole_load() : dembark::WallLoad{};
-  const auto &s = state_;
-  const double all[all_numbers] = {s.displacement.x,
-                                   s.displacement.y,
-                                   s.displacement.z,
-                                   s.angle,
-                                   s.velocity.x,
-                                   s.velocity.y,
-                                   s.velocity.z,
-                                   s.rate,
-                                   s.acceleration.x,
-                                   s.acceleration.y,
-                                   s.acceleration.z,
-                                   s.angular_acceleration,
-                                   load.force.x,
-                                   load.force.y,
-                                   load.force.z,
-                                   load.torque.x,
-                                   load.torque.y,
-                                   load.torque.z,
-                                   wall_power(load, s, motion_.axis()),
-                                   sums_.work,
-                                   sums_.impulse.x,
-                                   sums_.impulse.y,
-                                   sums_.impulse.z};
-  return all[n];
+  if (of_load > load_numbers) return wall_->number(n - load_numbers);
+  // The sums may be of a restart file, and the load that of a set-up.
+  const dembark::WallLoad load = total_load();
+  const double now[] = {load.force.x, load.force.y, load.force.z, load.torque.x, load.torque.y, load.torque.z, wall_->power(load)};
+  return now[of_load];
 }
 
 void FixWallMotion::write_restart(FILE *file) {
-  if (comm->me == 0) write_part(file, {{&clock_, sizeof clock_}, {&sums_, sizeof sums_}, {words_.c_str(), words_.size() + 1}});
+  if (comm->me == 0) write_part(file, wall_->pieces());
 }
 
 void FixWallMotion::restart(char *buffer) {
-  std::memcpy(static_cast<void *>(&clock_), buffer, sizeof clock_);
-  std::memcpy(static_cast<void *>(&sums_), buffer + sizeof clock_, sizeof sums_);
-  if (const std::string before = buffer + sizeof clock_ + sizeof sums_; before != words_)
-    fail("in the restart file its motion is '" + before +
-         "'; take that, or give the fix another ID: a motion that is new begins where the "
-         "mesh stands");
-  resumed_ = true;
+  checked([&] {
+    dembark_family::SavedPart saved(buffer);
+    wall_->restore(saved);
+    saved.end();
+  });
 }
 
 FixWallMotion *dembark_liggghts::find_wall_motion(Modify *modify, const AbstractMesh *mesh) {

@@ -1,7 +1,5 @@
 // fix ID group wall/motion mesh M HARMONIC|...: moves a mesh as dembark/motion/prescribed_motion.hpp says, exact to the step, and adds up
 // what the wall does to the grains.
-//
-// Forces of step n are computed from the grains' velocities v(n-1/2). The mesh has its own of that time, [x(n) - x(n-1)] / dt.
 #ifdef FIX_CLASS
 
 FixStyle(wall/motion,FixWallMotion)
@@ -11,13 +9,12 @@ FixStyle(wall/motion,FixWallMotion)
 #ifndef LMP_FIX_WALL_MOTION_H
 #define LMP_FIX_WALL_MOTION_H
 
+#include <memory>
 #include <string>
 
-#include "shared_fix.h"
 #include "modify.h"
 
-#include "dembark/motion/prescribed_motion.hpp"
-#include "dembark/motion/wall_work.hpp"
+#include "moving_wall.h"
 
 namespace LAMMPS_NS {
 
@@ -44,24 +41,18 @@ class FixWallMotion : public dembark_family::SharedFix {
   /// Adds a force on a grain of this rank, N, and the torque about its centre, N m.
   void add_load(const double *centre, const dembark::Vec3<double> &force, const dembark::Vec3<double> &torque);
   /// Of the mesh, at the time of the forces.
-  const dembark::WallAcceleration &acceleration() const { return acceleration_; }
+  const dembark::WallAcceleration &acceleration() const { return wall_->acceleration(); }
 
  private:
-  void set_velocities(const dembark::WallStep &step);
+  void set_velocities();
   void check_reach();
   void check_turn();
-  dembark::WallLoad whole_load();
-  void arrive(double t);
+  dembark::WallLoad total_load();
 
-  std::string mesh_id_, words_;
+  std::string mesh_id_;
   class AbstractMesh *mesh_ = nullptr;
-  dembark::PrescribedMotion motion_;
-  dembark::MotionClock clock_;
-  dembark::WallState state_;  // now
-  dembark::WallAcceleration acceleration_;
+  std::unique_ptr<dembark_family::MovingWall> wall_;
   dembark::WallLoad load_;  // of this rank
-  dembark::WallSums sums_;
-  bool resumed_ = false;    // the last step of `sums_` is that of a restart file
   bool knows_load_ = true;  // the contact models tell their forces
 };
 

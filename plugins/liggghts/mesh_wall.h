@@ -103,6 +103,12 @@ class MeshWall : public LIGGGHTS::Walls::Granular<Models> {
     LAMMPS_NS::FixWallMotion::walls_tell_loads = true;
   }
 
+  /// Before a run: since the last one fixes may have come and gone that move meshes.
+  void init_granular() override {
+    surfaces_.clear();
+    Stock::init_granular();
+  }
+
   void compute_force(LAMMPS_NS::FixWallGran* wall, LIGGGHTS::ContactModels::SurfacesIntersectData& contact, bool touching, double* velocity,
                      LAMMPS_NS::FixMeshSurface* fix = nullptr, int number = 0, LAMMPS_NS::TriMesh* mesh = nullptr,
                      int triangle = 0) override {

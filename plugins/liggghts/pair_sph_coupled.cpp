@@ -101,7 +101,8 @@ void PairSphCoupled::init_style() {
   if (!atom->rho_flag || !atom->p_flag) refuse("atoms have no density; use atom_style sph, or atom_style hybrid granular sph");
   if (force->newton_pair) refuse("set newton off: each rank computes all that acts on its own atoms");
   if (!comm->ghost_velocity) refuse("ghosts have no velocity; add the line communicate single vel yes");
-  if (std::strcmp(update->integrate_style, "verlet") != 0) refuse("only run_style verlet is supported");
+  for (const std::string &wrong : {dembark_family::run_style_error(*update), dembark_family::units_error(*force, *update)})
+    if (!wrong.empty()) refuse(wrong);
   if (domain->triclinic) refuse("the box must not be triclinic");
   fluid_fix_ = nullptr;
   solids_.clear();

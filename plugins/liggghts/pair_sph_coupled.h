@@ -41,6 +41,7 @@ class PairSphCoupled : public Pair {
 
   /// The pair style of this run, alone or in hybrid/overlay; nullptr if there is none.
   static PairSphCoupled *find(class Force *);
+  static constexpr const char *missing = "it needs pair_style sph/coupled, alone or in hybrid/overlay, before it";
 
   const dembark::sph::Settings &fluid() const { return scene_.settings; }
   /// At the beginning of a run, when there are ghosts and neighbours: checks, and pressures from the densities. first: no run was before.

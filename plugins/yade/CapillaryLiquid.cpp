@@ -146,7 +146,7 @@ void CapillaryLiquid::reconcile() {
 		excess);
 	if (full >= 0)
 		fail("CapillaryLiquid: the bridges of body " + std::to_string(full) + " hold " + text(excess) +
-		     " more than was given to them");
+		     " m^3 more than was given to them");
 	ledger.reconcile_walls(grains(), [this](int id, std::size_t wall, auto visit) {
 		for (const auto& [other, each] : Body::byId(id, scene)->intrs)
 			if (auto* phys = bridgeOf(*each); phys && phys->wallBody && wallNumber(other) == static_cast<int>(wall))

@@ -126,7 +126,7 @@ def test_what_knows_this_style_alone_refuses_hybrid_styles(tmp_path, words):
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
-    ("\nrun", "\nrun_style respa 2 2\nrun", ("run_style respa has several", "use run_style verlet")),
+    ("\nrun", "\nrun_style respa 2 2\nrun", ("run_style respa is not supported", "use run_style verlet")),
     ("\nrun", "\nminimize 0 0 10 10\nrun", ("no energy that minimize could lower",)),
     *(("units si", f"units {units}", (f"in units {units} force is not", "si, cgs, micro, nano or lj"))
       for units in ("real", "metal", "electron")),

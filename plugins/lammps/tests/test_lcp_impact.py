@@ -60,6 +60,12 @@ def test_other_run_styles_are_refused(tmp_path):
     assert "run_style respa is not supported; use run_style verlet" in refused(tmp_path, after="run_style respa 1")
 
 
+@pytest.mark.parametrize("units", ["real", "metal"])
+def test_units_without_newtons_law_are_refused(tmp_path, units):
+    text = pile(count=2, steps=1).text("lammps").replace("units si", f"units {units}")
+    assert f"in units {units} force is not mass times acceleration" in one_line(run_deck(tmp_path, text))
+
+
 def test_bodies_of_several_grains_are_refused(tmp_path):
     """Their forces would move the grains one by one."""
     line = refused(tmp_path, after="fix stiff all rigid/nve single")

@@ -122,7 +122,8 @@ def test_what_does_not_fit_is_refused(tmp_path):
     refused(tmp_path, other.replace("resume_state", "read_restart").replace(" bed\n", " bed.200.restart\n", 1),
             "the state is of 1 ranks, the run has 2", ranks=2)
     refused(tmp_path, other.replace("neighbor 0.002 bin", "neighbor 0.0025 bin"), "the atoms or their candidates for contacts are others")
-    refused(tmp_path, other.replace("resume_state bed", "read_restart stock.restart"), "was not written by this fix")
+    refused(tmp_path, other.replace("resume_state bed", "read_restart stock.restart"),
+            "this restart file has no exact state: it was written by restart or write_restart; read one that fix resume/exact has")
     # States are left as they are, and the way that the line shows is one.
     (tmp_path / "bed.200.restart.crc").rename(tmp_path / "kept")
     (tmp_path / "bed.100.restart.crc").unlink()

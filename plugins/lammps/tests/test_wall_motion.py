@@ -181,10 +181,14 @@ def test_wrong_motions_are_told_in_one_line(tmp_path, motion, line):
 
 @pytest.mark.parametrize(("motion", "line"), [
     ("harmonic amplitude 0 0 0.08 frequency 5", "out of the box along z"), ("uniform velocity 1000 0 0", "out of the box along x"),
-    (SHAKE, "")])
+    ("rotation point 0 0 0 axis 0 1 0 rate 3e4", "out of the box along x"), ("rotation point 0 0 0 axis 0 1 0 rate 1000", ""),
+    (SHAKE, ""), ("boundary f f fs uniform velocity 0 0 1000", ""), ("boundary f f sf uniform velocity 0 0 1000", "along z")])
 def test_a_wall_that_leaves_the_box_is_warned_of(tmp_path, motion, line):
-    """LAMMPS loses grains beyond the box, but not walls: a gate may leave."""
-    warnings = [one for one in run_deck(tmp_path, deck(tmp_path, motion, "run 10")).output.splitlines() if "takes its surface" in one]
+    """LAMMPS loses grains beyond the box, but not walls: a gate may leave. A face that shrinks is none to leave by."""
+    words = motion.split()
+    boundary = " ".join(words[1:4]) if words[0] == "boundary" else "f f f"
+    text = deck(tmp_path, motion.removeprefix(f"boundary {boundary} "), "run 10", boundary=boundary)
+    warnings = [one for one in run_deck(tmp_path, text).output.splitlines() if "takes its surface" in one]
     assert [line in one for one in warnings] == [True] * bool(line), warnings
 
 

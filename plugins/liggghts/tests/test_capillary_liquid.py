@@ -212,6 +212,15 @@ def test_liquid_set_by_hand_and_spread_by_contacts(tmp_path):
     assert column(rows, "bridges")[-1] > 0.0
 
 
+def test_liquid_that_changes_during_a_run_is_told_in_its_amounts(tmp_path):
+    write_floor(tmp_path / "floor.stl")
+    setting = 'run 2000 pre no every 1000 "set atom 63 property/atom capillaryLiquid 2e-9"'
+    done = run_deck(tmp_path, shaken(f"set atom 63 property/atom capillaryLiquid 1e-9\nrun 1\n{setting}", liquid="volume 0"))
+    assert done.code != 0
+    found = re.search(r"there is (\S+) m\^3 of liquid, and (\S+) m\^3 is due: the liquid of grains was changed during the run", done.error)
+    assert found and float(found[1]) > 1.9e-9 and abs(float(found[2]) - 1e-9) < 1e-17, done.error or done.output[-1500:]
+
+
 def test_largest_bridge(tmp_path):
     done = shaken("compute bridges all pair/gran/local id history\n"
                   "compute most all reduce max c_bridges[4]\n"  # after the two ids: bridge_volume is the first of the model

@@ -230,6 +230,13 @@ def test_what_it_cannot_account_for_is_told(tmp_path, change, told):
         assert words in done.error, done.error
 
 
+def test_atoms_that_go_within_a_run_are_told(tmp_path):
+    deletion = 'group some id 1\nrun 10\nrun 10 pre no every 5 "delete_atoms group some compress no"'
+    done = run_deck(tmp_path, bed(deletion))
+    assert done.code != 0
+    assert "atoms when forces were computed and" in done.error, done.error or done.output[-1500:]
+
+
 def test_unfix(tmp_path):
     done = run_deck(tmp_path, bed(f"run 100\nthermo_style one\nunfix energy\nrun 100\n{FIX}\n{COLUMNS}\nrun 100"))
     assert done.code == 0, done.output[-2000:]

@@ -226,6 +226,8 @@ def test_ranks_and_resumed_runs_move_alike(tmp_path):
     ("table file vessel.stl", "line 1: it must have four numbers"),
     ("table file back.csv", "line 3: the times do not ascend"),
     ("table file far.csv", "out of the box along x"),
+    ("rotation point 0 0 0 axis 0 1 0 rate 3e4", "out of the box along x"),
+    ("rocking point 0 0 -0.04 axis 0 1 0 angle 1.5 frequency 100 ramp 0", "out of the box along x"),
     ("table file none.csv", "file 'none.csv' cannot be read"),
     ("jolts shape half_sine acceleration 1 0 0 duration 2e-5", "below ten time steps"),
     ("shake amplitude 1", "there is no motion 'shake'")])
@@ -236,6 +238,33 @@ def test_wrong_motions_are_told_in_one_line(tmp_path, motion, line):
     assert done.code != 0
     assert line in done.error, done.error or done.output[-500:]
     assert len(done.error.strip().splitlines()) <= 2 and "Traceback" not in done.error
+
+
+@pytest.mark.parametrize(("boundary", "motion", "line"), [
+    ("f f fs", "uniform velocity 0 0 1000", ""), ("f f sf", "uniform velocity 0 0 1000", "out of the box along z"),
+    ("f f f", "rotation point 0 0 0 axis 0 1 0 rate 1000", ""),
+    ("f f f", "rocking point 0 0 0 axis 0 1 0 angle 0.1 frequency 100 ramp 0", "")])
+def test_each_face_of_the_box_and_each_arc_counts_by_itself(tmp_path, boundary, motion, line):
+    """A face that shrinks goes along with the mesh, and an arc may end before the mesh leaves."""
+    done = run_deck(tmp_path, deck(tmp_path, motion, "run 10", boundary=boundary))
+    assert line in done.error if line else "out of the box" not in done.error, done.error or done.output[-500:]
+
+
+def test_a_mesh_whose_fix_is_gone_adds_to_no_other_load(tmp_path):
+    """The grain rests on the first mesh, which no longer moves; the second, far away, touches nothing."""
+    far = [tuple((x, y, z + 0.03) for x, y, z in three) for three in rectangle((0.0, 0.0, 0.0), (0.01, 0.0, 0.0), (0.0, 0.01, 0.0))]
+    (tmp_path / "far.stl").write_text(stl(far))
+    still = "uniform velocity 1e-6 0 0"
+    text = deck(tmp_path, still, "run 100\nunfix move\nfix other all wall/motion mesh far " + still + "\nvariable f equal f_other[15]\n"
+                'fix out all print 10 "load ${f}"\nrun 100', grains=[((0.01, 0.01, 0.00248), 0.0025, (0, 0, 0))], held=True)
+    wall = models(DRY, wall="mesh n_meshes 1 meshes stl store_force yes")
+    assert wall in text
+    text = text.replace(wall, wall.replace("n_meshes 1 meshes stl", "n_meshes 2 meshes stl far"))
+    text = text.replace("fix wall all", "fix far all mesh/surface file far.stl type 2\nfix wall all")
+    done = run_deck(tmp_path, text)
+    assert done.code == 0, done.error or done.output[-1500:]
+    loads = [line for line in done.output.splitlines() if line.startswith("load ")]
+    assert loads and all(float(line.split()[1]) == 0.0 for line in loads), loads
 
 
 def test_a_mesh_that_another_fix_moves_too_is_refused_in_either_order(tmp_path):

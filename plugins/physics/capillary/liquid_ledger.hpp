@@ -172,7 +172,7 @@ class LiquidLedger {
   }
 
   /// Compares the tallies with the bridges between grains that are really there: `each(visit)` calls visit(i, j, volume, imbalance) for
-  /// all of them. What vanished goes back to each side. Returns a grain whose bridges hold `excess` more than it gave, or -1.
+  /// all of them. What vanished goes back to each side. Returns a grain whose bridges hold `excess` (m^3) more than it gave, or -1.
   template <class EachBridge>
   int reconcile_pairs(GrainLiquid grains, EachBridge each, double& excess) {
     std::vector<double> in_bridges(std::size_t(grains.owned), 0.0);
@@ -184,7 +184,7 @@ class LiquidLedger {
       double& tallied = of_pairs_[i];
       const double back = tallied - in_bridges[i], noise = rounding * std::max(tallied, grains.volume[i]);
       if (back < -noise) {
-        excess = -back / in_bridges[i];
+        excess = -back;
         return i;
       }
       if (back <= noise) continue;
@@ -244,8 +244,7 @@ class LiquidLedger {
   }
 
   /// Compares what is there with what should be. Less is lost if there are fewer grains than before; else it was changed from outside,
-  /// or, within a run, something is wrong: then returns the fraction that is missing, negative where there is too much, otherwise 0.
-  /// Collective.
+  /// or, within a run, something is wrong: then what is missing (m^3) is returned, otherwise 0. Collective.
   double audit(GrainLiquid grains, bool in_run) {
     const Totals there = totals(grains);
     const double now = there.held(), missing = expected - now;
@@ -256,7 +255,7 @@ class LiquidLedger {
       lost += missing;
       expected = now;
     } else if (std::abs(missing) > 1e-9 * std::max(now, expected)) {
-      if (in_run) wrong = missing / expected;
+      if (in_run) wrong = missing;
       added -= missing;
       expected = now;
     }

@@ -31,6 +31,28 @@ struct WallStep {
   double rate = 0.0;        ///< rad/s
 };
 
+/// Bounds of a motion over some time.
+struct WallReach {
+  Vec3<double> low{}, high{};                     ///< m, of the displacement
+  double least_angle = 0.0, largest_angle = 0.0;  ///< rad
+
+  explicit WallReach(const WallState& s) : low(s.displacement), high(s.displacement), least_angle(s.angle), largest_angle(s.angle) {}
+  void take(const WallState& s) {
+    const Vec3<double>& d = s.displacement;
+    low = {std::min(low.x, d.x), std::min(low.y, d.y), std::min(low.z, d.z)};
+    high = {std::max(high.x, d.x), std::max(high.y, d.y), std::max(high.z, d.z)};
+    least_angle = std::min(least_angle, s.angle);
+    largest_angle = std::max(largest_angle, s.angle);
+  }
+  /// By a term that goes to both sides of a middle.
+  void widen(const Vec3<double>& middle, const Vec3<double>& by, double middle_angle, double by_angle) {
+    low += middle - by;
+    high += middle + by;
+    least_angle += middle_angle - by_angle;
+    largest_angle += middle_angle + by_angle;
+  }
+};
+
 class PrescribedMotion {
  public:
   /// At rest.
@@ -89,24 +111,36 @@ class PrescribedMotion {
     return "its shortest period, " + number_text(shortest_period()) + " s, is below ten time steps of " + number_text(h) +
            " s: take a shorter step";
   }
-  /// Bounds (m) of the displacement from `from` to `to` (s); of oscillations at any time.
-  void reach(double from, double to, Vec3<double>& low, Vec3<double>& high) const {
+  /// From `from` to `to` (s); of oscillations at any time.
+  WallReach reach(double from, double to) const {
     constexpr int samples = 1000;
     PrescribedMotion rest = *this;
     rest.oscillations_.clear();
-    low = high = rest.at(from).displacement;
-    for (int k = 1; k <= samples; ++k) {
-      const Vec3<double> x = rest.at(from + (to - from) * k / samples).displacement;
-      low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};
-      high = {std::max(high.x, x.x), std::max(high.y, x.y), std::max(high.z, x.z)};
-    }
+    WallReach all(rest.at(from));
+    for (int k = 1; k <= samples; ++k) all.take(rest.at(from + (to - from) * k / samples));
     for (const auto& term : oscillations_) {
-      // Without a ramp the middle of the oscillation may be an amplitude away.
-      const double scale = term.ramp > 0.0 ? 1.0 : 2.0;
+      // Without a ramp it begins within the oscillation, whose middle is elsewhere.
+      const double sine = term.ramp > 0.0 ? 0.0 : std::sin(term.phase), cosine = term.ramp > 0.0 ? 0.0 : std::cos(term.phase);
       const Vec3<double>&s = term.sine.along, &c = term.cosine.along;
-      const Vec3<double> by{scale * std::hypot(s.x, c.x), scale * std::hypot(s.y, c.y), scale * std::hypot(s.z, c.z)};
-      low -= by;
-      high += by;
+      all.widen(-sine * s - cosine * c, {std::hypot(s.x, c.x), std::hypot(s.y, c.y), std::hypot(s.z, c.z)},
+                -sine * term.sine.about - cosine * term.cosine.about, std::hypot(term.sine.about, term.cosine.about));
+    }
+    return all;
+  }
+  /// Bounds (m) of a point of the wall over `all`; it is at `place` when the wall is in `state`.
+  void bounds(const Vec3<double>& place, const WallState& state, const WallReach& all, Vec3<double>& low, Vec3<double>& high) const {
+    // With the angle phi the point turns along flat cos(phi) + side sin(phi) about a middle on the axis.
+    const Vec3<double> arm = place - centre(state), side = cross(axis_, arm), flat = cross(side, axis_);
+    const Vec3<double> middle = place - flat;
+    const double from = all.least_angle - state.angle, to = all.largest_angle - state.angle;
+    low = middle + (all.low - state.displacement);
+    high = middle + (all.high - state.displacement);
+    for (double Vec3<double>::* const k : {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z}) {
+      const double radius = std::hypot(flat.*k, side.*k), top = std::atan2(side.*k, flat.*k);
+      const auto passes = [&](double angle) { return angle + motion::two_pi * std::ceil((from - angle) / motion::two_pi) <= to; };
+      const auto at = [&](double angle) { return flat.*k * std::cos(angle) + side.*k * std::sin(angle); };
+      low.*k += passes(top + 0.5 * motion::two_pi) ? -radius : std::min(at(from), at(to));
+      high.*k += passes(top) ? radius : std::max(at(from), at(to));
     }
   }
 

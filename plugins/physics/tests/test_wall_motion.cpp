@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -8,6 +9,7 @@
 #include "catch.hpp"
 
 #include "dembark/motion/prescribed_motion.hpp"
+#include "dembark/motion/wall_frame.hpp"
 #include "dembark/motion/wall_work.hpp"
 
 using namespace dembark;
@@ -146,8 +148,7 @@ TEST_CASE("wall motion: it begins from where the wall stands, at any time", "[mo
       late.begin(now);
       CHECK(norm(late.at(now).displacement) == 0.0);
       CHECK(late.at(now).angle == 0.0);
-      Vec3<double> low, high;
-      late.reach(now, now + 1.0, low, high);
+      const dembark::WallReach all = late.reach(now, now + 1.0);
       const bool given = words.find("start") != std::string::npos;
       const WallState from = early.at(now);
       for (double s = 0.0; s < 1.0; s += 0.0171) {
@@ -157,7 +158,7 @@ TEST_CASE("wall motion: it begins from where the wall stands, at any time", "[mo
         CHECK(std::abs(here.angle - (same.angle - (given ? from.angle : 0.0))) < 1e-13);
         CHECK(norm(here.velocity - same.velocity) < 1e-12);
         CHECK(std::abs(here.rate - same.rate) < 1e-12);
-        CHECK((here.displacement.x > low.x - 1e-3 && here.displacement.z < high.z + 1e-3));
+        CHECK((here.displacement.x > all.low.x - 1e-3 && here.displacement.z < all.high.z + 1e-3));
       }
       // The speed of the half step before: what has no start has always been going on, oscillations begin.
       CHECK(norm(late.step(now - 1e-6, 1e-6).velocity - early.step(given ? now - 1e-6 : -1e-6, 1e-6).velocity) < 1e-9);
@@ -168,6 +169,37 @@ TEST_CASE("wall motion: it begins from where the wall stands, at any time", "[mo
   std::remove(name.c_str());
   PrescribedMotion ends{std::string("uniform velocity 0 0 1 until 0.1")};
   CHECK_THROWS_WITH(ends.begin(0.2), "motion uniform: until 0.1 s must be later than start 0.2 s");
+}
+
+TEST_CASE("wall motion: the bounds of a point that turns hold, and are reached", "[motion]") {
+  const Vec3<double> point{0.3, -0.2, 0.1};
+  for (const char* words : {"rotation point 0.1 0.2 0.3 axis 1 2 3 rate 2", "rotation point 0 0 0 axis 0 0 1 rate 90",
+                            "rocking point 0 0.1 0 axis 0 1 0 angle 0.4 frequency 3 ramp 0 phase 1",
+                            "rotation point 0 0 0 axis 0 1 0 rate -1 acceleration 3 uniform velocity 0.1 0 -0.2",
+                            "rocking point 0 0.1 0 axis 0 1 0 angle 0.4 frequency 30 ramp 2"}) {
+    INFO(words);
+    PrescribedMotion motion{std::string(words)};
+    motion.begin(0.25);
+    // As a mesh has it, at its place now.
+    const double now = 0.35;
+    const WallState then = motion.at(now);
+    const dembark::WallFrame frame(motion, then);
+    Vec3<double> low, high, least{1e9, 1e9, 1e9}, most = -1.0 * least;
+    motion.bounds(point, then, motion.reach(now, now + 1.0), low, high);
+    const Vec3<double> own = frame.inside(point);
+    for (int k = 0; k <= 4000; ++k) {
+      const WallState state = motion.at(now + k / 4000.0);
+      const Vec3<double> place = motion.centre(state) + dembark::WallFrame(motion, state).outside(own - motion.centre({}));
+      least = {std::min(least.x, place.x), std::min(least.y, place.y), std::min(least.z, place.z)};
+      most = {std::max(most.x, place.x), std::max(most.y, place.y), std::max(most.z, place.z)};
+    }
+    const Vec3<double> below = least - low, above = high - most;
+    const double room = std::string(words).find("uniform") == std::string::npos ? 1e-3 : 0.3;
+    for (const double gap : {below.x, below.y, below.z, above.x, above.y, above.z}) {
+      CHECK(gap > -1e-5);
+      CHECK(gap < room);
+    }
+  }
 }
 
 TEST_CASE("wall motion: what is wrong is told in one line", "[motion]") {
