@@ -5,7 +5,9 @@ if(EXISTS "${LIGGGHTS_SOURCE_DIR}/version_liggghts.txt")
   file(STRINGS "${LIGGGHTS_SOURCE_DIR}/version_liggghts.txt" version LIMIT_COUNT 1)
 endif()
 if(NOT version STREQUAL "3.8.0" OR NOT EXISTS "${LIGGGHTS_SOURCE_DIR}/Make.sh")
-  message(FATAL_ERROR "LIGGGHTS_SRC=${LIGGGHTS_SOURCE_DIR} is not the folder src of LIGGGHTS-PUBLIC 3.8.0 (version found: ${version})")
+  set(wrong "${LIGGGHTS_SOURCE_DIR}")
+  unset(LIGGGHTS_SOURCE_DIR CACHE)  # for the next time
+  message(FATAL_ERROR "LIGGGHTS_SRC=${wrong} is not the folder src of LIGGGHTS-PUBLIC 3.8.0 (version found: ${version})")
 endif()
 
 set(LIGGGHTS_INCLUDE_DIR ${CMAKE_CURRENT_BINARY_DIR}/engine)
