@@ -118,7 +118,7 @@ REFUSED = {
     "overlap": ("fix fluid g1", "displace_atoms g1 move 0.1 0 0 units box\nfix fluid g1", "of the fluid overlaps another: it is 0.00"),
     "two groups": ("fix body3 g3", "fix again g1 sph/wall\nfix body3 g3", "is in two groups"),
     "units": ("units si", "units metal", "in units metal force is not mass times acceleration"),
-    "no pair": ("fix weight", "unfix fluid\npair_style none\nfix weight", "it needs pair_style sph/coupled"),
+    "no pair": ("fix weight", "unfix fluid\npair_style none\natom_modify sort 0 0.0\nfix weight", "it needs pair_style sph/coupled"),
     "weight": ("fix weight all", "fix weight g2", "the group of fix gravity must hold the whole fluid"),
 }
 
