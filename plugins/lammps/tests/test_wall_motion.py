@@ -181,7 +181,7 @@ def test_wrong_motions_are_told_in_one_line(tmp_path, motion, line):
 
 @pytest.mark.parametrize(("motion", "line"), [
     ("harmonic amplitude 0 0 0.08 frequency 5", "out of the box along z"), ("uniform velocity 1000 0 0", "out of the box along x"),
-    ("rotation point 0 0 0 axis 0 1 0 rate 3e4", "out of the box along x"), ("rotation point 0 0 0 axis 0 1 0 rate 1000", ""),
+    ("rotation point 0.05 0 0 axis 0 1 0 rate 3e4", "out of the box along x"), ("rotation point 0.05 0 0 axis 0 1 0 rate 1000", ""),
     (SHAKE, ""), ("boundary f f fs uniform velocity 0 0 1000", ""), ("boundary f f sf uniform velocity 0 0 1000", "along z")])
 def test_a_wall_that_leaves_the_box_is_warned_of(tmp_path, motion, line):
     """LAMMPS loses grains beyond the box, but not walls: a gate may leave. A face that shrinks is none to leave by."""

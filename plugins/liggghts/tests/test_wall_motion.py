@@ -226,7 +226,7 @@ def test_ranks_and_resumed_runs_move_alike(tmp_path):
     ("table file vessel.stl", "line 1: it must have four numbers"),
     ("table file back.csv", "line 3: the times do not ascend"),
     ("table file far.csv", "out of the box along x"),
-    ("rotation point 0 0 0 axis 0 1 0 rate 3e4", "out of the box along x"),
+    ("rotation point 0.05 0 0 axis 0 1 0 rate 3e4", "out of the box along x"),
     ("rocking point 0 0 -0.04 axis 0 1 0 angle 1.5 frequency 100 ramp 0", "out of the box along x"),
     ("table file none.csv", "file 'none.csv' cannot be read"),
     ("jolts shape half_sine acceleration 1 0 0 duration 2e-5", "below ten time steps"),
@@ -242,7 +242,7 @@ def test_wrong_motions_are_told_in_one_line(tmp_path, motion, line):
 
 @pytest.mark.parametrize(("boundary", "motion", "line"), [
     ("f f fs", "uniform velocity 0 0 1000", ""), ("f f sf", "uniform velocity 0 0 1000", "out of the box along z"),
-    ("f f f", "rotation point 0 0 0 axis 0 1 0 rate 1000", ""),
+    ("f f f", "rotation point 0.05 0 0 axis 0 1 0 rate 1000", ""),
     ("f f f", "rocking point 0 0 0 axis 0 1 0 angle 0.1 frequency 100 ramp 0", "")])
 def test_each_face_of_the_box_and_each_arc_counts_by_itself(tmp_path, boundary, motion, line):
     """A face that shrinks goes along with the mesh, and an arc may end before the mesh leaves."""
