@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 using namespace LAMMPS_NS;
-using dembark::motion::text;
+using dembark::number_text;
 
 namespace dembark_family {
 namespace {
@@ -65,8 +65,8 @@ std::string MovingWall::outside(const std::vector<Vec3>& middles, const dembark:
   constexpr int fixed = 1;  // periodic is 0, faces that shrink are 2 and 3
   for (int k = 0; k < 3; ++k)
     if ((box.boundary[k][0] == fixed && low[k] < box.boxlo[k]) || (box.boundary[k][1] == fixed && high[k] > box.boxhi[k]))
-      return std::string("out of the box along ") + "xyz"[k] + ": it comes from " + text(low[k]) + " to " + text(high[k]) +
-             " m, and the box is from " + text(box.boxlo[k]) + " to " + text(box.boxhi[k]) + " m";
+      return std::string("out of the box along ") + "xyz"[k] + ": it comes from " + number_text(low[k]) + " to " + number_text(high[k]) +
+             " m, and the box is from " + number_text(box.boxlo[k]) + " to " + number_text(box.boxhi[k]) + " m";
   return "";
 }
 

@@ -137,9 +137,9 @@ class PrescribedMotion {
     high = middle + (all.high - state.displacement);
     for (double Vec3<double>::* const k : {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z}) {
       const double radius = std::hypot(flat.*k, side.*k), top = std::atan2(side.*k, flat.*k);
-      const auto passes = [&](double angle) { return angle + motion::two_pi * std::ceil((from - angle) / motion::two_pi) <= to; };
+      const auto passes = [&](double angle) { return angle + two_pi * std::ceil((from - angle) / two_pi) <= to; };
       const auto at = [&](double angle) { return flat.*k * std::cos(angle) + side.*k * std::sin(angle); };
-      low.*k += passes(top + 0.5 * motion::two_pi) ? -radius : std::min(at(from), at(to));
+      low.*k += passes(top + 0.5 * two_pi) ? -radius : std::min(at(from), at(to));
       high.*k += passes(top) ? radius : std::max(at(from), at(to));
     }
   }

@@ -8,6 +8,7 @@
 
 #include "catch.hpp"
 
+#include "dembark/constants.hpp"
 #include "dembark/integration/adams.hpp"
 
 using namespace dembark;
@@ -15,8 +16,6 @@ using Catch::WithinAbs;
 using Catch::WithinRel;
 
 namespace {
-
-constexpr double pi = 3.14159265358979323846;
 
 /// x'' = -omega^2 x.
 struct Oscillator {

@@ -10,14 +10,15 @@
 #include <type_traits>
 
 #include "dembark/capillary/bridge_law.hpp"
+#include "dembark/constants.hpp"
 
+using dembark::pi;
 using namespace dembark::capillary;
 using Catch::Contains;
 using Catch::Matchers::WithinRel;
 
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
 constexpr double degree = pi / 180.0;
 const std::initializer_list<Model> models{Model::exact,      Model::willett, Model::willett_full,
                                           Model::rabinovich, Model::bagheri, Model::constant};

@@ -8,14 +8,15 @@
 #include <vector>
 
 #include "dembark/capillary/bridge_law.hpp"
+#include "dembark/constants.hpp"
 
+using dembark::pi;
 using namespace dembark::capillary;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
 constexpr double degree = pi / 180.0;
 
 /// Touching bridge of any volume, by continuation from a small one.

@@ -3,6 +3,7 @@
 #include <vector>
 #include "catch.hpp"
 
+#include "dembark/constants.hpp"
 #include "dembark/impact/scene.hpp"
 
 using namespace dembark;
@@ -11,8 +12,6 @@ using Catch::WithinAbs;
 using Catch::WithinRel;
 
 namespace {
-
-constexpr double pi = 3.14159265358979323846;
 
 Body body(int id, double mass, double x, double v, int material = 0) {
   Body b;

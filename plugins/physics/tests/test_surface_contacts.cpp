@@ -7,6 +7,7 @@
 #include <vector>
 #include "catch.hpp"
 
+#include "dembark/constants.hpp"
 #include "dembark/surface/point_grid.hpp"
 #include "dembark/surface/surface_contacts.hpp"
 
@@ -17,7 +18,6 @@ using Catch::WithinRel;
 namespace {
 
 typedef Vec3<double> V;
-constexpr double pi = 3.14159265358979323846;
 
 struct Touch {
   int triangle;
