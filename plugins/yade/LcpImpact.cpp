@@ -73,6 +73,7 @@ const NewtonIntegrator& LcpImpact::integrator() const {
 		     "; it must be -1 with LcpImpact, hold bodies by blockedDOFs");
 	bool after = false;
 	for (const auto& each : scene->engines) {
+		if (each.get() == &newton) break;
 		after = after || each.get() == this;
 		if (after && !each->dead && dynamic_cast<const FieldApplier*>(each.get()))
 			fail(each->getClassName() + " stands after LcpImpact; engines that add forces must stand before it in O.engines");
