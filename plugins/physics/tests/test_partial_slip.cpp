@@ -2,6 +2,7 @@
 #include <vector>
 #include "catch.hpp"
 
+#include "dembark/normal_force.hpp"
 #include "dembark/partial_slip.hpp"
 
 using namespace dembark;
