@@ -227,7 +227,7 @@ def test_ranks_and_resumed_runs_move_alike(tmp_path):
     ("table file back.csv", "line 3: the times do not ascend"),
     ("table file far.csv", "out of the box along x"),
     ("rotation point 0.05 0 0 axis 0 1 0 rate 3e4", "out of the box along x"),
-    ("rocking point 0 0 -0.04 axis 0 1 0 angle 1.5 frequency 100 ramp 0", "out of the box along x"),
+    ("rocking point 0 0 -0.055 axis 0 1 0 angle 1.5 frequency 100 ramp 0", "out of the box along x"),
     ("table file none.csv", "file 'none.csv' cannot be read"),
     ("jolts shape half_sine acceleration 1 0 0 duration 2e-5", "below ten time steps"),
     ("shake amplitude 1", "there is no motion 'shake'")])
