@@ -107,7 +107,7 @@ def test_a_dump_without_forces_of_walls_says_so(here, capsys):
         assert ("has no forces of walls (columns f_force_NAME[1..3])" in capsys.readouterr().out) == said
     # A wall whose columns come later.
     assert fields([frame(0), frame(1, **wall)], contacts=[pairs(0), pairs(1)]) == 0
-    assert "where the wall base is, is not known" in capsys.readouterr().out
+    assert "the position of the wall base is unknown" in capsys.readouterr().out
     assert main(["walls", "g.dump", "--frames", "1", "--wall", "base:plane", "--out", "w.nc"]) == 0
     assert fields([frame(0, walls={"base": np.zeros((4, 3))})]) == 0
     assert main(["walls", "g.dump", "--wall", "base:plane", "--out", "w.nc"]) == 0
@@ -176,7 +176,7 @@ def test_contacts_of_another_step_are_not_taken_for_those_of_the_grains():
     pair = ContactFrame(8, PLACES[:1], PLACES[1:2] - PLACES[:1], np.ones((1, 3)), grains.ids[None, :2])
     grid = Grid.around(grains, 0.05)
     for average in (lambda: coarse_grain(grains, pair, grid, width=0.01), lambda: cell_totals(grains, pair, grid)):
-        with pytest.raises(DembarkError, match="contacts of step 8 and grains of step 7, give both of the same step"):
+        with pytest.raises(DembarkError, match="the contacts are of step 8, the grains of step 7, give both of the same step"):
             average()
 
 

@@ -86,7 +86,7 @@ def test_fields_of_dumps_with_options(run, capsys):
     assert main([*words, "--threads", "1"]) == 0
     said = capsys.readouterr().out
     assert "2 frames, 1 to 3 of 4; steps 200 to 400, 0.2 to 0.4 s" in said
-    assert "where the wall base is, is not known" in said
+    assert "the position of the wall base is unknown" in said
     with xarray.open_dataset("f.nc") as found:
         assert dict(found.sizes) | {"x": 3, "y": 4, "z": 5, "time": 1} == dict(found.sizes)
         assert found.time.values == pytest.approx([0.3]) and float(found.z_bounds.max()) == pytest.approx(0.05)
@@ -269,7 +269,7 @@ MISTAKES = [
     (["walls", "run/grains.dump", "--wall", "stone:inclusion:ids=9"], "--contacts"),
     (["walls", "run", "--patch", "nothing"], "--patch"),
     (["walls", "run", "--wall", "base:mesh:file=run/base.stl:unit=furlongs"],
-     "unit=furlongs, in --wall base, it must be m, dm, cm, mm, um, in, ft or d"),
+     "unit=furlongs is unknown, in --wall base, it must be m, dm, cm, mm, um, in, ft or d"),
     (["walls", "run", "--plot", "run/run.json"], "name a folder"),
     (["walls", "run", "--paraview", "w.vtk"], ".pvd"),
     (["walls", "empty", "--out", "w.nc"], "no grains.dump"),

@@ -7,7 +7,7 @@ from rig.fluid import dam, resumed
 from rig.fluid import deck as fluid
 from rig.liggghts_driver import run_deck
 from rig.packing import CREATE, STATE, packing
-from rig.restart_parts import OTHER, spoil
+from rig.restart_parts import OTHER, cut, spoil
 from rig.scenarios import Material
 from rig.walls import stl
 
@@ -28,7 +28,7 @@ def assert_refused(folder: Path, again: str, fix: str, size: bool, file: str = "
     spoil(folder / file, fix, size=size)
     done = run_deck(folder, again, name="again.in")
     assert done.code != 0, done.output[-1500:]
-    assert OTHER in done.error and fix in done.error, done.error
+    assert (cut(fix) if size else OTHER) in done.error and fix in done.error, done.error
 
 
 @pytest.mark.parametrize("size", [False, True], ids=["format", "size"])

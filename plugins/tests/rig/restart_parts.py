@@ -9,6 +9,11 @@ FORMAT = b"dembark1"
 OTHER = "this restart file was written by another version of dembark; go on with that version, or give the fix another ID"
 
 
+def cut(fix: str) -> str:
+    """What a part that is too short is refused with."""
+    return "the saved state is incomplete or damaged" if fix == "watch" else OTHER
+
+
 def spoil(path: Path, fix: str, *, size: bool = False) -> None:
     """The part of a fix gets another format, or a size that is 8 bytes smaller."""
     data = bytearray(path.read_bytes())

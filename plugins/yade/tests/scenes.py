@@ -212,7 +212,7 @@ def save_load_partial_slip():
 
 
 def other_formats():
-    """What loading says of a scene in which one class is said to be of another format: of each class of dembark with attributes."""
+    """What loading says of a scene in which one class is said to be of another format: of each class that the file names."""
     O.reset()
     bodies = [moving((0, 0, 0), 0.0025), Body(shape=CylinderWall(radius=0.1))]
     place(bodies, DENSITY)
@@ -223,7 +223,7 @@ def other_formats():
     text = open("format.xml", encoding="utf-8").read()
     said = {}
     for name in ("FacetSurface", "Ig2_FacetSurface_Sphere_ScGeom", "SphereContactLoop", "CapillaryLiquid", "EnergyAccount",
-                 "IntegrationMonitor", "WallMotion", "LogWall", "CylinderWall"):
+                 "IntegrationMonitor", "WallMotion", "CylinderWall"):
         changed, found = re.subn(rf'(class_name="yade::{name}" tracking_level="\d" version=)"\d+"', r'\1"99"', text)
         open("format.xml", "w", encoding="utf-8").write(changed)
         said[name] = [found, refusal(lambda: O.load("format.xml", quiet=True))]

@@ -218,8 +218,8 @@ def test_a_long_path_needs_memory_for_its_points_alone():
     ({"healing_time": -1.0}, "healing_time"),
     ({"healing_time": np.nan}, "healing_time"),
     ({"static_friction": np.inf}, "static_friction"),
-    ({"friction_limit": "viscous"}, "'total' or 'elastic'"),
-    ({"presliding": "curved"}, "'linear' or 'exponential' or 'partial_slip'"),
+    ({"friction_limit": "viscous"}, "must be total or elastic"),
+    ({"presliding": "curved"}, "must be linear, exponential or partial_slip"),
 ])
 def test_bad_parameters(change, words):
     with pytest.raises(ValueError, match=words) as caught:
