@@ -12,6 +12,7 @@ from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.plug_flow import channel
 from dembark.input_decks.plug_flow.channel import Channel, Mask, read_periodic
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
+from dembark.postproc.studies import quantity
 
 # Quantities without a verdict where no steady flow was found.
 FLOW = ("greatest_velocity", "slip_velocity", "velocity_ratio", "shear_zone_thickness", "core_flatness")
@@ -87,7 +88,7 @@ def study(_name: str, points: Points, along: str) -> Measurement:
     grown = {"greatest_velocity": PowerLawFit.of(points, "greatest_velocity", cells, speeds),
              "slip_velocity": PowerLawFit.of(points, "slip_velocity", cells, speeds),
              "thickness": PowerLawFit.of(points, "shear_zone_thickness", cells)}
-    reasons = [next(one["reason"] for one in point["quantities"] if one["name"] == "greatest_velocity") for point in points]
+    reasons = [quantity(point, "greatest_velocity")["reason"] for point in points]
     broken = next((f"W = {width:.0f} d: {reason}" for width, reason in zip(cells, reasons, strict=True) if reason), "")
     short = f"the abstract refers to sufficiently wide channels without a width; these are {cells[0]:.0f} to {cells[-1]:.0f} d"
     scaled = [(np.array(one["place"], float), np.array(one["value"], float))

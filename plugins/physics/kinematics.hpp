@@ -5,8 +5,8 @@
 
 namespace dembark {
 
-/// Whether this "normal" is that of coincident centres: any direction would be a guess. A unit normal has a square of 1 but for rounding,
-/// that of coincident centres is no number or infinite; any bound above 1 tells them apart.
+/// Whether this "normal" is that of coincident centres: any direction would be a guess. The square of a unit normal is 1 but for rounding,
+/// that of coincident centres is NaN or infinite; any bound above 1 distinguishes them.
 DEMBARK_FUNCTION inline bool has_no_direction(const Vec3<double>& normal) { return !(dot(normal, normal) < 2.0); }
 
 /// Motion of body 1 against body 2 at the contact.

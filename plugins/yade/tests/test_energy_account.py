@@ -199,7 +199,7 @@ def test_saved_account_goes_on(found, ending):
 
 
 def test_a_saved_account_of_another_size_is_refused(yade):
-    """It would go on from zero, beside the kinetic energies of its bodies, with a false balance."""
+    """It would go on from zero with the kinetic energies of its bodies, and its balance would be false."""
     line = yade.scenes("cut_ledger", script="energy_scenes.py")["cut_ledger"]
     assert line.startswith("dembark: EnergyAccount: ") and "another version of dembark" in line and "\n" not in line
 
