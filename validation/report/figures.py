@@ -126,7 +126,7 @@ def profile_figure(profiles: Curves, names: Sequence[str], columns: int = 2) -> 
 def panels_figure(panels: Sequence[Entries], columns: int = 2) -> Figure:
     """A figure with a panel for each of `panels`, which are profiles with their engines."""
     rows = math.ceil(len(panels) / columns)
-    tall = 1.95 * rows + 0.3
+    tall = 1.8 * rows + 0.3
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, tall))
         # Fixed margins: long titles must not make the panels narrow.

@@ -1,4 +1,5 @@
-"""The first pages: verdicts case by case, failed checks with their causes, missing results, and open checks with what decides them."""
+"""The first pages: verdicts case by case, missing results, failed checks with their causes, bias and scatter, and open checks with what
+decides them."""
 
 from __future__ import annotations
 
@@ -19,8 +20,10 @@ from . import scatter
 from .facts import Fact, facts
 from .gather import ReportData, Row
 
-# Lines of each list that the PDF holds; what is left out is counted, and in the HTML.
-MOST = {"failed": 8, "open": 18, "missing": 6, "checks": 16}
+# Lines of each list that the PDF holds; what is left out is counted, and in the HTML. Checks are those of all cases together, of which
+# each case shows as many as the others, but no fewer than CHECKS_OF_CASE.
+MOST = {"failed": 8, "open": 18, "missing": 6, "checks": 300}
+CHECKS_OF_CASE = 6
 
 # The kinds of evidence in order of importance of a failure.
 _WEIGHT = ("experiment", "theory", "identity", "", "code")
@@ -128,10 +131,11 @@ def context(gathered: ReportData) -> Mapping[str, Any]:
     lacking = {page.case: 0 for page in gathered.pages}
     for page in gathered.pages:
         lacking[page.case] += len(page.missing)
+    most = MOST | {"checks": max(CHECKS_OF_CASE, MOST["checks"] // max(1, len(lacking)))}
     return {"tally": counted, "kinds": [kind for kind in (*EVIDENCE, "") if kind or "" in counted.by_evidence], "meaning": MEANING,
             "cases": case_lines(rows, lacking), "failed": failed_groups(judged), "facts": judged, "open": open_lines(rows),
             "missing": gathered.missing, "points": found, "points_by_kind": scatter.kinds(found), "left_out": scatter.left_out(rows),
-            "scatter_lines": len(scatter.lines(found)), "most": MOST}
+            "scatter_lines": len(scatter.lines(found)), "most": most}
 
 
 def write_tables(folder: Path, rows: Sequence[Row], found: Sequence[scatter.Point]) -> None:
