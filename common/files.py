@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from .errors import RunError
+from .errors import DembarkError, RunError
 
 DISK_FULL = "the disk is full"
 _TIMESTEP = b"ITEM: TIMESTEP\n"
@@ -30,7 +30,10 @@ def _sync(path: Path) -> None:
 
 
 def write_atomic(path: Path, content: bytes) -> Path:
-    """Write `content` so that a reader sees the old file or the complete new one, also after a crash; returns the path."""
+    """Write `content` so that a reader sees the old file or the complete new one, also after a crash; returns the path. DembarkError for
+    a path that is no regular file, which would be replaced by one."""
+    if path.exists() and not path.is_file():
+        raise DembarkError(f"{path} is no regular file", "", "name another place")
     part = path.with_name(f".{path.name}.part-{os.getpid()}")
     try:
         part.write_bytes(content)

@@ -85,7 +85,7 @@ def is_held(path: Path, dead_after: float = DEAD_AFTER) -> bool:
 def _of_this_host(path: Path) -> bool:
     """Whether the holder is a process of this host; then it lives, or its lock would have been taken."""
     try:
-        return f"\nhost={socket.gethostname()}" in path.read_text(encoding="utf-8", errors="replace")
+        return f"\nhost={socket.gethostname()}\n" in path.read_text(encoding="utf-8", errors="replace")
     except OSError:
         return False
 

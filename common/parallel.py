@@ -33,11 +33,16 @@ def _end_with(parent: BaseProcess) -> None:
     os._exit(1)
 
 
+def cores_here() -> int:
+    """Cores that this process may use, which a scheduler may have made fewer than the machine has."""
+    return len(os.sched_getaffinity(0))
+
+
 def parallel_map(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
     """`function` of each of `items`, in their order; by as many processes as there are cores when they are many, for which
     `function`, items and what comes of them must be picklable. What `function` raises is raised here; RunError when a process was
     killed."""
-    cores = len(os.sched_getaffinity(0))
+    cores = cores_here()
     if cores == 1 or len(items) <= _FEW:
         return [function(item) for item in items]
     # A process with threads of Python must not be copied; one that is begun anew imports all again.

@@ -6,7 +6,7 @@ import signal
 import sys
 import time as clock
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -109,7 +109,7 @@ def fields(
 
     if not any((out, paraview, grains, plot)):
         raise DembarkError("there is nothing to write", "", "name a file with --out or --paraview, or a folder with --plot")
-    _check_places(out, paraview, grains, plot=plot)
+    _check_places(out, paraview, grains, plot=plot, read=(source, contacts))
     opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
                          contact_columns=contact_columns, units=units)
     chosen = select(opened, frame_numbers(frames, len(opened.grains)))
@@ -157,7 +157,7 @@ def walls(
     units: Units = "",
 ) -> None:
     """Normal and shear stress on walls and inclusions: distribution, time series, fluctuations, peaks."""
-    _check_places(out, paraview, plot=plot)
+    _check_places(out, paraview, plot=plot, read=(source, contacts))
     opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
                          contact_columns=contact_columns, units=units)
     chosen = select(opened, frame_numbers(frames, len(opened.grains)))
@@ -193,14 +193,17 @@ def walls(
           *(line for one in results for line in wall_lines(one, opened)), *(f"written: {path}" for path in written)])
 
 
-def _check_places(out: Path | None, *collections: Path | None, plot: Path | None) -> None:
-    """DembarkError when an output cannot be where it shall be, or two are the same file."""
+def _check_places(out: Path | None, *collections: Path | None, plot: Path | None, read: Iterable[Path | None]) -> None:
+    """DembarkError when an output cannot be where it shall be, or two are the same file, or one is a file that is `read`."""
+    sources = [file for path in read if path for file in (path, *path.glob("*.dump"), *path.parent.glob(path.name)) if file.is_file()]
     given = [path for path in (out, *collections) if path is not None]
     for path in given:
         if path.is_dir():
             raise DembarkError(f"{path} is a folder", "", "name a file")
         if not path.parent.is_dir():
             raise DembarkError(f"there is no folder {path.parent}", f"for {path.name}", "make it first")
+        if path.is_file() and any(path.samefile(one) for one in sources):
+            raise DembarkError(f"{path} is a file that is read", "", "name another place")
         if given.count(path) > 1:
             raise DembarkError(f"{path} is named twice", "", "give each output a file of its own")
     if any(collections):

@@ -96,6 +96,8 @@ def contact_columns(text: str) -> dict[str, list[int | str]]:
         if not words:
             raise DembarkError(f"{part!r} names no columns", "in --contact-columns",
                                "write first=1,2,3 second=4,5,6 ids=7,8 forces=10,11,12")
+        if name in found:
+            raise DembarkError(f"{name} is given twice", "in --contact-columns", "give each once")
         found[name] = [int(word) if word.isdecimal() else word for word in words.split(",")]
     return found
 
@@ -127,6 +129,10 @@ def parse_wall(text: str, diameter: float) -> PatchedWall:
         pick(key, _KINDS[kind], f"key of a {kind}", f"in {where}")
         if not sign and key != "outside":
             raise DembarkError(f"{key!r} has no value", f"in {where}", f"write {key}=value")
+        if sign and key == "outside":
+            raise DembarkError("'outside' takes no value", f"in {where}", "leave it out for a wall that grains are inside of")
+        if key in options:
+            raise DembarkError(f"{key!r} is given twice", f"in {where}", "give each key once")
         options[key] = value
     return _WallOptions(name, kind, options, diameter, where).patched()
 

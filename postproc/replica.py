@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -13,6 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dembark.common.parallel import cores_here
 
 from . import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
 
@@ -85,7 +86,7 @@ class Replica:
     def mapped(self, work: Callable[[GrainFrame, ContactFrame], Measured]) -> Iterator[tuple[GrainFrame, Measured]]:
         """Every frame in order with `work(grains, contacts)`, done in as many threads as there are cores: most of what is done with arrays
         leaves the interpreter to others. Few frames are in memory at a time."""
-        threads = len(os.sched_getaffinity(0))
+        threads = cores_here()
         with ThreadPoolExecutor(threads) as pool:
             ahead = deque[tuple[GrainFrame, Future[Measured]]]()
             for grains, contacts in self.paired_frames():

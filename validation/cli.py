@@ -14,6 +14,7 @@ import typer
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.extras import missing_extra
+from dembark.common.parallel import cores_here
 from dembark.common.units import seconds
 from dembark.postproc import cli as postproc
 from dembark.validation import doctor, engines, provenance, show
@@ -156,7 +157,7 @@ def make_report(
     if not any(folder.glob("*/*/*/metrics.json")) and not any(folder.glob("*/*/*/replica-*/run.json")):
         raise DembarkError(f"no results in {folder}", "", "give the folder of a campaign; a run has its metrics.json" if directory else
                            f"run 'dembark validate --profile {profile}' first, or give --results")
-    outcome = workflow.conclude(folder, workflow.cancelled_by_signal(), os.cpu_count() or 1)
+    outcome = workflow.conclude(folder, workflow.cancelled_by_signal(), cores_here())
     for line in outcome.problems:
         show.console().print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
     show.console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)

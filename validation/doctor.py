@@ -13,6 +13,7 @@ from pathlib import Path
 
 from dembark.common.checkout import checkout
 from dembark.common.errors import DembarkError
+from dembark.common.extras import install_line
 from dembark.validation import engines, provenance
 from dembark.validation.case import folders
 
@@ -51,7 +52,7 @@ def _packages(extra: str, names: tuple[str, ...]) -> Finding:
     absent = [name for name, version in versions.items() if version is None]
     title = f"Python packages for {extra}" if extra else "Python packages"
     found = None if absent else ", ".join(f"{name} {version}" for name, version in versions.items())
-    right = f"pip install 'dembark[{extra}]'" if extra else "run 'make'"
+    right = install_line(extra) if extra else "run 'make'"
     return Finding(title, found, not extra, f"{', '.join(absent)} missing: {right}")
 
 

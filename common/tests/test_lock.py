@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -20,11 +21,11 @@ HOLDER = ("import sys, time; from pathlib import Path; from dembark.common.lock 
           "with lock(Path(sys.argv[1]), 'x'): print('held', flush=True); time.sleep(60)")
 
 
-def elsewhere(path: Path) -> None:
+def elsewhere(path: Path, host: str = "another-host") -> None:
     """A lock as a process of another host leaves it."""
     with lock(path, "busy", **TIMES):
         text = path.read_text(encoding="utf-8")
-    lines = ["host=another-host" if line.startswith("host=") else line for line in text.splitlines()]
+    lines = [f"host={host}" if line.startswith("host=") else line for line in text.splitlines()]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -81,6 +82,14 @@ def test_that_of_a_dead_process_of_another_host_is_taken(tmp_path: Path) -> None
     elsewhere(path)
     os.utime(path, (time.time() - 10, time.time() - 10))
     assert not is_held(path, 0.6)
+
+
+def test_a_host_is_known_by_its_full_name(tmp_path: Path) -> None:
+    """node10 is not node1."""
+    path = tmp_path / "lock"
+    elsewhere(path, socket.gethostname() + "0")
+    with lock(path, "taken", threading.Event(), **TIMES):
+        assert f"host={socket.gethostname()}\n" in path.read_text()
 
 
 def test_its_holder_learns_that_it_was_taken(tmp_path: Path) -> None:

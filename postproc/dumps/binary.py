@@ -89,6 +89,8 @@ class BinaryDump(Dump):
                     step, count, fault = head.step, head.count, f"truncated, fewer than its {head.count} rows ({HINT})"
                     for _ in range(head.blocks):
                         (length,) = self._take(handle, _BLOCK)
+                        if length < 0:
+                            raise DumpError(f"{self.path}, frame {number}: a block of {length} numbers; is this a binary dump of LAMMPS?")
                         if not self._source.reach(handle, handle.tell() + 8 * length):
                             raise CutOffError
                 except CutOffError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +13,7 @@ from scipy.ndimage import map_coordinates
 from dembark import _fields
 from dembark.common.errors import DembarkError
 from dembark.common.memory import check_memory
+from dembark.common.parallel import cores_here
 
 from ..contacts import ContactFrame
 from ..dumps.frames import cell
@@ -100,7 +100,7 @@ def _target(grid: Grid, kernel: Kernel, frame: GrainFrame, closed: bool, threads
     """What the compiled code spreads onto: all periodic images in the box of `frame` count. With `closed`, the shares of each place inside
     the grid are scaled to sum to 1 within it, and places outside have none; otherwise what lies beyond the grid is lost."""
     places, shares = unit_gauss(kernel.nodes_per_cell(grid))
-    cores = len(os.sched_getaffinity(0))
+    cores = cores_here()
     return _fields.Target(
         low=grid.low, high=grid.high, shape=np.array(grid.shape, float), edges=cell(frame.low, frame.high, frame.tilt),
         periodic=np.array(grid.periodic, float), box_periodic=np.array(frame.periodic, float), kind=NAMES.index(kernel.name),

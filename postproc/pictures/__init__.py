@@ -7,11 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dembark.common.errors import RunError
+from dembark.common.errors import DembarkError
 from dembark.common.extras import missing_extra
 from dembark.common.files import write_atomic
-
-from .. import DumpError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,8 +42,8 @@ def draw(folder: Path, wanted: Mapping[str, Any] | None) -> list[str]:
                 sections.animate(scene, folder / ANIMATION)
         else:
             image = packings.picture(replica.parent, **wanted)
-    except (DumpError, RunError) as error:
-        return [f"No picture: {error}."]
+    except Exception as error:  # noqa: BLE001 - the measurement does without it
+        return [f"No picture: {error if isinstance(error, DembarkError) else f'{type(error).__name__}: {error}'}."]
     write_atomic(folder / PICTURE, image)
     return []
 

@@ -31,6 +31,12 @@ def test_surface_of_a_simple_cubic_packing():
     assert profiles.surface_height(place[:, 2], np.full(1000, 0.5), 100.0) == pytest.approx(10.0, abs=0.6)
 
 
+def test_surface_of_a_filling_of_one_density():
+    """Spheres that lie anywhere: half of those at the surface reach beyond it."""
+    heights = np.random.default_rng(1).uniform(0.0, 20.0, 200_000)
+    assert profiles.surface_height(heights, np.full(200_000, 0.5), 200_000 / 20.0) == pytest.approx(20.0, abs=0.02)
+
+
 def test_lagrangian_velocity_is_displacement_over_time():
     paths = np.array([[[0.0, 0.0, 0.0]], [[5.0, 5.0, 5.0]], [[1.0, 0.0, -2.0]]])
     np.testing.assert_allclose(profiles.lagrangian_velocities(paths, np.array([0.0, 0.1, 0.5])), [[2.0, 0.0, -4.0]])

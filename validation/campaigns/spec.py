@@ -106,14 +106,14 @@ def read(path: Path) -> CampaignSpec:
 
 def _refuse_decimal_commas(path: Path) -> None:
     """DembarkError for a list such as `[0,15, 0.3]`: TOML reads three numbers where two were meant."""
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
-        bare = re.sub(r"\"[^\"]*\"|'[^']*'|#.*", '""', line)
-        for part in re.findall(r"\[[^\[\]]*\]", bare):
-            tight = re.search(r"\b(\d+),(\d+)\b", part)
-            if tight and re.search(r",\s", part):
-                first, second = tight.groups()
-                raise DembarkError(f"{tight.group()!r} in a list: write {first}.{second}, or {first}, {second} if these are two numbers",
-                                   f"line {number} of {path}")
+    lines = path.read_text(encoding="utf-8").splitlines()
+    bare = "\n".join(re.sub(r"\"[^\"]*\"|'[^']*'|#.*", '""', line) for line in lines)
+    for part in re.finditer(r"\[[^\[\]]*\]", bare):
+        tight = re.search(r"\b(\d+),(\d+)\b", part.group())
+        if tight and re.search(r",\s", part.group()):
+            first, second = tight.groups()
+            raise DembarkError(f"{tight.group()!r} in a list: write {first}.{second}, or {first}, {second} if these are two numbers",
+                               f"line {bare.count(chr(10), 0, part.start() + tight.start()) + 1} of {path}")
 
 
 class _Reader(TableReader):

@@ -95,6 +95,8 @@ def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) ->
     """Write everything that `engine` needs for a run with the parameters `values` into `folder`; returns what was derived."""
     require_capable(case, engine, values)
     setup = prepare(case, values)
+    # Nothing is written before the deck is known to be right.
+    files = _files(case, engine, values, setup)
     folder.mkdir(parents=True, exist_ok=True)
     # Parts of decks are in the decks already.
     for name, path in _companions(case).items():
@@ -102,7 +104,7 @@ def write(case: Case, engine: str, values: Mapping[str, Value], folder: Path) ->
             continue
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, folder / name)
-    for name, content in _files(case, engine, values, setup).items():
+    for name, content in files.items():
         (folder / name).write_bytes(content)
     return setup
 

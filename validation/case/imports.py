@@ -219,4 +219,5 @@ def _version(library: str) -> str:
     try:
         return metadata.version(library)
     except metadata.PackageNotFoundError:
-        return ""
+        # What is imported and what is installed may have different names, such as PIL and pillow.
+        return " ".join(sorted({metadata.version(name) for name in metadata.packages_distributions().get(library, ())}))

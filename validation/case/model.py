@@ -65,6 +65,8 @@ def checked(parameter: Parameter, value: Value) -> Value:
         if parameter.optional:
             return None
         raise DembarkError(f"{parameter.name} must have a value", parameter.range)
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise DembarkError(f"{parameter.name} = {value!r} is neither a number nor a word", parameter.range)
     if parameter.values:
         if value not in parameter.values:
             raise DembarkError(f"{parameter.name} = {value!r} is not allowed", f"allowed are {parameter.range}")

@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Self
 from dembark.common.checkout import checkout
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
+from dembark.common.extras import install_line
 
 # Where the start of MPI programs is named, for engines without a launcher of their own.
 LAUNCHER = "DEMBARK_MPIRUN"
@@ -155,7 +156,7 @@ class Engine(ABC):
             where, way = f"{here} is not there" + (", nor is it on PATH" if facts.on_path else ""), f"build it with '{facts.target}'"
         else:
             where = "it is not on PATH" if facts.on_path else ""
-            way = f"pip install 'dembark[{facts.extra}]'" if facts.extra else f"build it with '{facts.target}' in a checkout of dembark"
+            way = install_line(facts.extra) if facts.extra else f"build it with '{facts.target}' in a checkout of dembark"
         raise DembarkError(f"{facts.program} not found", where, f"{way} or set {facts.variables[0]} to its executable")
 
     @classmethod

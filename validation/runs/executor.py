@@ -120,7 +120,13 @@ class Executor:
     def _start(self) -> None:
         # Steps first: they are short, and their numbers are what people wait for.
         for step in [one for one in self._steps if self._open.isdisjoint(one.needs)]:
-            if step.up_to_date():
+            try:
+                done = step.up_to_date()
+            except Exception as error:  # noqa: BLE001 - a file that is being replaced must not end the runs under way
+                self._steps.remove(step)
+                self._failed(step, _in_one_line(step, error))
+                continue
+            if done:
                 self._open.discard(step.name)
                 self._steps.remove(step)
             elif self._fits(Resources()):
@@ -168,8 +174,8 @@ class Executor:
             future.result()
         except (Killed, Interrupted, BrokenProcessPool, CancelledError) as error:
             self._stopped(item, error if isinstance(error, DembarkError) else RunError(f"{item.name} was ended from outside"))
-        except DembarkError as error:
-            self._failed(item, error)
+        except Exception as error:  # noqa: BLE001 - one that fails stops no other
+            self._failed(item, _in_one_line(item, error))
         else:
             self._states.change(item.name, state="finished")
             self._open.discard(item.name)
@@ -193,6 +199,10 @@ class Executor:
         self.errors[item.name] = error
         self._states.change(item.name, state="failed", message=_reason(item, error))
         self._open.discard(item.name)
+
+
+def _in_one_line(item: Task | Step, error: Exception) -> DembarkError:
+    return error if isinstance(error, DembarkError) else RunError(f"{item.name} failed", f"{type(error).__name__}: {error}")
 
 
 def _reason(item: Task | Step, error: DembarkError) -> str:

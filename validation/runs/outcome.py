@@ -21,7 +21,7 @@ _STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal
 
 # What one rank says; it may begin in the middle of a line, because the output of ranks is interleaved.
 _OF_ONE_RANK = re.compile(r"ERROR on proc \d+: ")
-_STEPS = re.compile(r"dembark: steps (\d+) time_step (\S+)")
+_STEPS = re.compile(r"dembark: steps (\d+) time_step ([-+.\de]+)\s*$")
 _STEP = re.compile(r"\s*(\d+)\s+[-+]?(?:\d|\.\d|nan|inf)")
 
 
@@ -99,7 +99,8 @@ def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
     if number and not (faulty and number in _STOPPED):
         hint = "by hand or because memory ran out" if number == signal.SIGKILL else ""
         kind = Killed if number in _STOPPED else RunError
-        raise kind(f"the engine was killed by {signal.Signals(number).name} {where}", hint)
+        name = next((one.name for one in signal.Signals if one == number), f"signal {number}")
+        raise kind(f"the engine was killed by {name} {where}", hint)
     if stop_message and not parser.finished and not faulty and any(stop_message in line for line in lines):
         raise Killed(f"the engine was asked to stop {where}")
     if code:
@@ -111,9 +112,13 @@ def judge(run: Run, code: int, parser: OutputParser, work: Path) -> None:
 
 
 def integration(work: Path) -> dict[str, float]:
-    """What the run's integration monitor found (largest errors of one step, fewest steps of a contact); empty where it had none."""
+    """What the run's integration monitor found (largest errors of one step, fewest steps of a contact); empty where it had none, or where
+    its line is cut off."""
     words = next((line for line in reversed(_tail(work / "engine.log")) if line.startswith("dembark: integration ")), "").split()[2:]
-    return {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
+    try:
+        return {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
+    except ValueError:
+        return {}
 
 
 def check_output(work: Path, outputs: Sequence[str], wanted: Value) -> int:

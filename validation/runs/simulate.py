@@ -190,6 +190,10 @@ def _run_into(run: Run, target: Path, progress: Progress, cancel: threading.Even
         faulty = computed and not isinstance(error, Killed) and not str(error).startswith(DISK_FULL)
         kept, going_on = (False, "") if faulty else _resumption(run, work)
         raise type(error)(f"{run.name} failed", str(error), going_on, _keep_log(work, target)) from None
+    except Exception:
+        # What went wrong around the run is no reason to lose its state.
+        kept, _ = _resumption(run, work)
+        raise
     finally:
         if not kept:
             shutil.rmtree(work, ignore_errors=True)

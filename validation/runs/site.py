@@ -47,8 +47,11 @@ class Site:
         """This process's environment after the preamble; DembarkError when that fails."""
         # What it prints must not get into the list of variables; one of comments alone needs a command.
         script = f"set -e\n{{ :\n{self.preamble}\n}} >&2\nenv -0"
-        done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
-                              timeout=120, check=False)
+        try:
+            done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
+                                  timeout=120, check=False)
+        except subprocess.TimeoutExpired:
+            raise DembarkError(f"the preamble of {self.path} has not ended after two minutes", "", "try it in a shell") from None
         if done.returncode:
             raise DembarkError(f"the preamble of {self.path} fails", last_words(done), "correct it, or try it in a shell")
         return dict(entry.split("=", 1) for entry in done.stdout.split("\0") if "=" in entry)

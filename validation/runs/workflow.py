@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 import threading
@@ -15,6 +14,7 @@ from typing import Any
 from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error, read_json, write_json
 from dembark.common.lock import lock
+from dembark.common.parallel import cores_here
 from dembark.validation import results
 from dembark.validation.campaigns import expand
 from dembark.validation.campaigns.plan import Plan, Resources, Series
@@ -65,7 +65,7 @@ def validate(profile: str, cancel: threading.Event, cores: int | None = None, re
     planned, folder = expand.profile(profile, cases, engines), results_root.resolve() / profile
     with lock(folder / LOCK, f"another validation works in {folder}"):
         write_json(folder / PLAN, planned.as_json())
-        return perform(planned, folder, cancel, cores or os.cpu_count() or 1)
+        return perform(planned, folder, cancel, cores or cores_here())
 
 
 def perform(plan: Plan, folder: Path, cancel: threading.Event, cores: int, memory: float | None = None, log: Path | None = None,
@@ -133,7 +133,7 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise disk_error(error, out) from None
-    cores = jobs * used.cores if jobs else max(used.cores, os.cpu_count() or 1)
+    cores = jobs * used.cores if jobs else max(used.cores, cores_here())
     # Why a run failed is said once, at the end.
     _, errors = _watched([Task(run, out, used) for run in one.runs], (), cancel, cores, reasons=False)
     if errors:
@@ -150,7 +150,9 @@ def refuse_foreign(one: Series, out: Path) -> None:
     wanted = {run.folder_name: run.inputs for run in one.runs}
     for path in sorted(out.glob(f"replica-*/{RECORD}")) if out.is_dir() else []:
         record: dict[str, Any] = read_json(path) or {}
-        if wanted.get(path.parent.name) != record.get("inputs"):
+        if path.parent.name not in wanted:
+            raise DembarkError(f"{path.parent} is one replica more than asked for", "", "choose another --out, or --force")
+        if wanted[path.parent.name] != record.get("inputs"):
             raise DembarkError(f"{path.parent} holds a result of other inputs", "",
                                "choose another --out, or --force to replace it when the new run is finished")
     if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not any(out.glob("replica-*")) and not _ours(out))):

@@ -43,14 +43,14 @@ def test_physics_and_dumps_are_of_the_core_and_what_is_missing_is_one_line(tmp_p
                    tmp_path / "grains.dump", "--out", tmp_path / "fields.nc")
     assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
     assert np.array(done.stdout.split(), float)[1] == 0.1
-    assert "xarray" in done.stderr and "pip install 'dembark[fields]'" in done.stderr
+    assert "xarray" in done.stderr and "pip install '.[fields]'" in done.stderr
 
 
 def test_a_report_without_its_libraries_is_one_line(tmp_path):
     (tmp_path / "plan.json").write_text('{"runs": []}')
     done = blocked("from pathlib import Path; from dembark.validation.runs.steps import build_report\n"
                    "try: build_report(Path(sys.argv[1]))\nexcept Exception as error: print(error)", tmp_path)
-    assert "matplotlib is not installed, pip install 'dembark[report]'" in done.stdout, done.stderr
+    assert "matplotlib is not installed, pip install '.[report]'" in done.stdout, done.stderr
 
 
 def test_the_doctor_names_the_extra_of_an_absent_package(monkeypatch):
@@ -58,7 +58,7 @@ def test_the_doctor_names_the_extra_of_an_absent_package(monkeypatch):
     monkeypatch.setattr(provenance, "package_version", lambda name: None if name in ("xarray", "scipy") else known(name))
     core, fields, report = (one for one in doctor.examine() if one.what.startswith("Python packages"))
     assert (core.found, core.required, fields.found, fields.required, bool(report.found)) == (None, True, None, False, True)
-    assert "scipy missing" in core.advice and "pip install 'dembark[fields]'" in fields.advice
+    assert "scipy missing" in core.advice and "pip install '.[fields]'" in fields.advice
 
 
 def test_the_extras_are_those_of_pyproject():

@@ -120,6 +120,8 @@ MISTAKES = {
     "not a number": (SWEEP + "grid = { grain_diameter = [nan] }\n", "grain_diameter = nan: give a finite number"),
     "decimal comma": (SWEEP + 'grid = { static_friction = ["0,15", 0.3] }\n',
                       "static_friction: '0,15' has a comma; write the decimal point: 0.15, [sweeps 1.grid] of"),
+    "decimal comma in a list of several lines": (SWEEP + "grid = { static_friction = [\n0,15,\n 0.3] }\n",
+                                                 "'0,15' in a list: write 0.15, or 0, 15 if these are two numbers, line 7 of"),
     "decimal comma in memory": (GRID + '[resources]\nmemory = "1,5 GB"\n', "'1,5 GB' has a comma; write the decimal point: 1.5 GB"),
     "empty grid": (SWEEP + "grid = {}\n", "the grid is empty"),
     "axis without values": (SWEEP + "grid = { grain_count = [] }\n", "grain_count = [] has no values"),

