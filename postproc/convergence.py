@@ -19,7 +19,7 @@ SAFETY, SAFETY_UNSEEN_ORDER = 1.25, 3.0
 _ORDER_AGREES, _LOWEST_ORDER = 0.1, 0.5
 _HIGHEST_ORDER = 8.0
 
-# How a parameter of the method makes the numerical error small: h falls with it as value**exponent. The relative overlap of Hertz contacts
+# How a parameter of the method makes the numerical error small: h = value**exponent, up to a constant. The overlap of Hertz contacts
 # under a given load falls with the stiffness to the power 2/3.
 REFINEMENT = {"time_step_fraction": 1.0, "time_step": 1.0, "youngs_modulus": -2.0 / 3.0}
 
@@ -45,7 +45,8 @@ def refinement(parameter: str, value: float) -> float:
 
 
 def observed_order(h: Sequence[float], values: Sequence[float]) -> float:
-    """Order p with which `values` (3,) at h[0] < h[1] < h[2] converge: the root of Celik et al.'s equation; NaN when there is none.
+    """Order p with which `values` (3,) at h[0] < h[1] < h[2] converge: the root of Celik et al.'s equation, 8 for a higher one; NaN when
+    there is none.
 
     The ratio (v2 - v1) / (v1 - v0) of an error a h^p is (h2^p - h1^p) / (h1^p - h0^p), which grows with p.
     """
@@ -61,23 +62,26 @@ def observed_order(h: Sequence[float], values: Sequence[float]) -> float:
             return math.log(c / b) / math.log(b / a)
         return float((c**p - b**p) / (b**p - a**p))
 
-    if not ratio(0.0) < wanted < ratio(_HIGHEST_ORDER):
+    if not ratio(0.0) < wanted:
         return math.nan
+    if wanted >= ratio(_HIGHEST_ORDER):
+        return _HIGHEST_ORDER
     return float(brentq(lambda p: ratio(p) - wanted, 0.0, _HIGHEST_ORDER, xtol=1e-15))
 
 
 def convergence(h: Sequence[float], values: Sequence[float], halves: Sequence[float] | None = None,
                 formal_order: float = 1.0) -> Convergence:
-    """Judge `values` at refinements `h` (any order, at least two different ones) with half-widths `halves` of their 95 % intervals.
+    """Judge `values` at refinements `h` (any order, two or more, all different) with half-widths `halves` of their 95 % intervals.
 
     The finest three decide. With only two, or where a change is within its joint interval, no order can be observed: then the bound
     takes `formal_order`, the largest change that the intervals allow and the safety factor 3. An order that is observed within 10 % of the
     formal one takes the formal one and 1.25; any other takes 3 and at most the formal order, at least 1/2, for a high one that is seen
-    once would make the uncertainty vanish. ValueError for fewer than two refinements, or h <= 0.
+    once would make the uncertainty vanish. ValueError for fewer than two refinements, one that is given
+    twice, or h <= 0.
     """
-    if len(set(h)) < 2 or min(h) <= 0.0:
-        raise ValueError("convergence needs at least two different refinements, all positive")
-    rows = sorted(zip(h, values, halves or [0.0] * len(values), strict=True))[:3]
+    if not 2 <= len(h) == len(set(h)) or min(h) <= 0.0:
+        raise ValueError("convergence needs two refinements or more, all positive and different")
+    rows = sorted(zip(h, values, [0.0] * len(values) if halves is None else halves, strict=True))[:3]
     sizes, found, spread = (list(column) for column in zip(*rows, strict=True))
     ratio = sizes[1] / sizes[0]
     change, joint = found[0] - found[1], math.hypot(spread[0], spread[1])

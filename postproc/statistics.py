@@ -195,12 +195,12 @@ def combined(parts: Sequence[float]) -> float:
 def over_replicas(estimates: Sequence[Estimate]) -> Estimate:
     """One estimate from those of the replicas: Student's interval over replicas from three on, else their own intervals pooled.
 
-    Two values say next to nothing about a spread (t = 12.7 with one degree of freedom), less than what varies inside each run.
+    Two values say little about a spread (t = 12.7 with one degree of freedom); their interval reaches to both at least.
     """
     if len(estimates) >= 3:
         return replica_mean([one.value for one in estimates])
     mean = float(np.mean([one.value for one in estimates]))
-    half = combined([one.half for one in estimates]) / len(estimates)
+    half = max(combined([one.half for one in estimates]) / len(estimates), *(abs(one.value - mean) for one in estimates))
     plural = "" if len(estimates) == 1 else "s"
     return Estimate(mean, half, f"within {len(estimates)} replica{plural}: {estimates[0].basis}")
 

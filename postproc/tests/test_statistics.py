@@ -95,7 +95,8 @@ def test_jackknife_of_a_mean_is_the_standard_error():
 
 def test_pooling_below_three_replicas_keeps_their_own_intervals():
     assert over_replicas([Estimate(1.0, 0.3)]).half == 0.3
-    assert over_replicas([Estimate(1.0, 0.3), Estimate(2.0, 0.4)]) == Estimate(1.5, 0.25, "within 2 replicas: ")
+    assert over_replicas([Estimate(1.25, 0.3), Estimate(1.75, 0.4)]) == Estimate(1.5, 0.25, "within 2 replicas: ")
+    assert over_replicas([Estimate(1.0, 0.3), Estimate(2.0, 0.4)]).half == 0.5  # they differ by more than either varies
     assert over_replicas([Estimate(1.0, 9.0)] * 3).half == 0.0
 
 
