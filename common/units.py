@@ -160,8 +160,8 @@ def _total(text: str, units: Mapping[str, float], what: str, examples: str) -> f
 
 def size_text(count: float) -> str:
     """Bytes for people: `12 MB`, `3.4 GB`."""
-    for unit in ("GB", "MB", "kB"):
-        if count >= _SIZES[unit]:
+    for unit in ("TB", "GB", "MB", "kB"):
+        if round(count / _SIZES[unit], 3) >= 1.0:
             return f"{count / _SIZES[unit]:.3g} {unit}"
     return f"{count:.0f} B"
 

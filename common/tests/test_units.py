@@ -56,4 +56,4 @@ def test_texts_that_are_no_duration(text: str) -> None:
 @given(st.floats(1.0, 1e15))
 def test_sizes_are_written_as_they_are(count: float) -> None:
     number, unit = size_text(count).split()
-    assert float(number) * {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}[unit] == pytest.approx(count, rel=0.006, abs=0.5)
+    assert float(number) * {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}[unit] == pytest.approx(count, rel=0.006, abs=0.5)

@@ -90,22 +90,30 @@ class Entry:
 
 
 def kept_entries(entries: Sequence[Entry]) -> tuple[list[Entry], str]:
-    """The frames in the order of their steps, of equal steps the one later in the file; and one line about what that changed, or ""."""
+    """The frames in the order of their steps; and one line about what that changed, or "".
+
+    A frame whose step was there before is of a run that was resumed at an earlier state: it replaces that frame, and all later ones of the
+    run before.
+    """
     back = [other for one, other in itertools.pairwise(entries) if other.step <= one.step]
     if not back:
         return list(entries), ""
-    kept = {entry.step: entry for entry in sorted(entries, key=lambda entry: (entry.step, entry.file, entry.number))}
+    kept: dict[int, Entry] = {}
+    for entry in sorted(entries, key=lambda entry: (entry.file, entry.number)):
+        if entry.step in kept:
+            kept = {step: one for step, one in kept.items() if step < entry.step}
+        kept[entry.step] = entry
     dropped = len(entries) - len(kept)
     said = f"steps go back in frame {back[0].number}; frames were sorted by step"
     if dropped:
-        said += f", {dropped} that {'are' if dropped > 1 else 'is'} repeated later in the file {'were' if dropped > 1 else 'was'} left out"
-    return list(kept.values()), said
+        said += f", {dropped} that a resumed run replaces {'were' if dropped > 1 else 'was'} left out"
+    return [kept[step] for step in sorted(kept)], said
 
 
 class Dump(ABC):
     """The frames of a trajectory in the order of their steps, found once and read one at a time.
 
-    A restarted run may write steps again: of frames with equal steps the one later in the file is kept, which DumpWarning says. A last
+    A restarted run may write steps again: its frames replace those of the run before, which DumpWarning says. A last
     frame that was cut off is refused, or left out with `skip_truncated=True`; `truncated` then says so in one line. `remarks` holds all
     such lines. With `stream=True` nothing is searched beforehand: iterating yields the first frame at once and refuses steps that go
     back; any other use makes the index.

@@ -286,5 +286,5 @@ def test_more_threads_than_can_be_started_do_no_harm(here):
 def test_free_memory_is_that_of_the_machine():
     assert 1e6 < memory.free_memory() < 1e14
     memory.check_memory(1e7, "a few cells", "")
-    with pytest.raises(DembarkError, match=r"cells are too many: they take 1e\+\d+ GB of memory, .* GB are free, take fewer"):
+    with pytest.raises(DembarkError, match=r"cells are too many: they take 1e\+\d+ TB of memory, .* GB are free, take fewer"):
         memory.check_memory(1e18, "cells", "take fewer")

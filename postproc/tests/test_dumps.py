@@ -170,7 +170,7 @@ def test_file_that_grows_is_looked_at_anew(write):
 def test_restarted_run_keeps_the_later_frames(write):
     again = [frame(step, [(1, 9.0, 9.0)]) for step in (10, 20)]
     path = write(plain(0), plain(10), plain(20), *again, plain(30))
-    with pytest.warns(DumpWarning, match="steps go back in frame 4.* 2 that are repeated") as caught:
+    with pytest.warns(DumpWarning, match="steps go back in frame 4.* 2 that a resumed run replaces were left out") as caught:
         dump = TextDump(path)
     assert dump.remarks == (str(caught[0].message),)
     assert dump.steps.tolist() == [0, 10, 20, 30]
@@ -179,6 +179,13 @@ def test_restarted_run_keeps_the_later_frames(write):
     assert [next(streamed).step for _ in range(3)] == [0, 10, 20]
     with pytest.raises(DumpError, match=r"frame 4: step 10 comes after step 20"):
         next(streamed)
+
+
+def test_frames_of_a_run_that_was_given_up_do_not_follow_those_of_the_resumed_one(write):
+    """Resumed at step 10 and killed at once: steps 20 and 30 are of the run before."""
+    path = write(plain(0), plain(10), plain(20), plain(30), frame(10, [(1, 9.0, 9.0)]))
+    with pytest.warns(DumpWarning, match="3 that a resumed run replaces"):
+        assert TextDump(path).steps.tolist() == [0, 10]
 
 
 @pytest.mark.parametrize(("cut", "skip"), [(5, False), (9, False), (12, False), (27, True), (32, True), (60, True)])

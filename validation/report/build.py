@@ -46,7 +46,8 @@ def write(gathered: ReportData, chapters: Any) -> Path:
     try:
         drawn.mkdir(parents=True, exist_ok=True)
         for old in drawn.iterdir():
-            old.unlink()
+            if old.suffix in (".csv", ".svg"):
+                old.unlink()
         own = chapters(drawn)
         first = front.context(gathered)
         front.write_tables(drawn, gathered.rows, first["points"])

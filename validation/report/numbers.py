@@ -18,7 +18,7 @@ def plain(value: float | None, digits: int = 3) -> str:
         return "–"
     if value == 0:
         return "0"
-    power = math.floor(math.log10(abs(value)))
+    power = int(f"{value:.{digits - 1}e}".partition("e")[2])  # once it is rounded
     if -3 <= power < 5:
         return f"{value:.{max(0, digits - 1 - power)}f}".replace("-", "−")
     return f"{value / 10**power:.{digits - 1}f}·10{str(power).translate(_SUPERSCRIPTS)}".replace("-", "−")

@@ -319,3 +319,9 @@ def test_a_figure_of_a_missing_picture_is_left_out(tmp_path):
         path.unlink()
     (one,) = sections.sections(gather(folder), tmp_path)
     assert one.pictures == [] and one.figures == []
+
+
+@pytest.mark.parametrize(("value", "text"), [(99_940.0, "99940"), (99_960.0, "1.00·10⁵"), (999_960.0, "1.00·10⁶"), (9.996e-4, "0.00100"),
+                                             (9.999, "10.0"), (-1.5e-5, "−1.50·10⁻⁵"), (0.0, "0"), (None, "–")])
+def test_a_number_has_its_digits_after_it_is_rounded(value: float | None, text: str) -> None:
+    assert numbers.plain(value) == text
