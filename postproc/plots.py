@@ -137,7 +137,7 @@ def axis_label(label: str, unit: str) -> str:
 
 def profile_figure(fields: FieldSet, names: Sequence[str], axis: str = "z") -> Figure:
     """Scalars (see `scalar`) along `axis`, drawn upwards along z: means over the cells across it that are filled, those with a value
-    and more than a tenth of the largest density. Beyond walls, where only the kernel reaches, nothing is to dilute them."""
+    and more than a tenth of the largest density. Cells beyond the walls, which only the kernel reaches, do not count."""
     along = _AXES.index(axis)
     place = 1e3 * fields.grid.centres(along)
     others = tuple(other for other in range(3) if other != along)

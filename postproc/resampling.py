@@ -18,8 +18,8 @@ def resampled(measure: Callable[[NDArray[np.bool_], NDArray[np.bool_]], float], 
     """`measure(keep_frames, keep_places)` with an interval from what varies in time and, with `places`, from place to place.
 
     `overlap`: variance among places that share samples, over that among independent ones. The wider of the two jackknife intervals counts:
-    places stand for the disorder of the packing, which time does not average out, and what is left of the
-    variation in time is in their differences too; blocks of time add what all places do together.
+    places stand for the disorder of the packing, which time does not average out, and their spread holds their own variation in time;
+    blocks of time show what all places do together.
     """
     everywhere = np.ones(0 if places is None else len(places), bool)
     in_time = jackknife(lambda keep: measure(keep, everywhere), frames.groups, name="time blocks")

@@ -206,8 +206,8 @@ def over_replicas(estimates: Sequence[Estimate]) -> Estimate:
 
 
 def rescaled(half: float, count: float, other: float, confidence: float = CONFIDENCE) -> float:
-    """Half-width of the interval of the mean of `other` values that scatter as `count` with Student's half-width `half` do; infinite
-    `count`: known exactly how they scatter, which no number of values changes."""
+    """The half-width that the mean of `other` values of the same scatter would have, when that of `count` has `half`; infinite `count`:
+    known exactly how they scatter, which no number of values changes."""
     if not math.isfinite(count):
         return half
     now, then = (student(number - 1.0, confidence) / math.sqrt(number) for number in (count, other))

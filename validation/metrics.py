@@ -47,7 +47,7 @@ def measure(folder: Path, wanted: int | None = None) -> Result:
     kept = measurement_file.read(folder, inputs_hash) or _measure(folder, case, runs, inputs_hash)
     parameters = {key: value for key, value in first["parameters"].items() if key != "seed"}
     if wanted is not None and "replicas" in parameters:
-        # Those of an earlier request for fewer or more are kept, and know its number.
+        # Replicas of an earlier request are kept; their records hold the number asked for then.
         parameters["replicas"] = wanted
     numbers = {int(one.record["replica"]) for one in runs}
     return Result(

@@ -50,7 +50,7 @@ def front(frame: GrainFrame, depth: float, diameter: float) -> float:
 
 
 def behind(places: Array, masses: Array, share: float) -> float:
-    """The one of `places` (n,) in m of grains behind which, up to and with itself, `share` of their `masses` (n,) lies."""
+    """Place (m) up to which `share` of the mass lies, of grains at `places` (n,) in m with `masses` (n,) in kg."""
     order = np.argsort(places)
     part = np.cumsum(masses[order]) / masses.sum()
     return float(places[order[np.searchsorted(part, share)]])

@@ -1,5 +1,5 @@
 """Momentum and energy of a run as its history holds them: impulses of the walls from forces of every step, and how well the sums balance.
-Both engines move a grain by kicks: over the steps from m to n, M (v(n) - v(m)) = dt (F(m)/2 + F(m+1) + ... + F(n-1) + F(n)/2) at any step.
+All engines move a grain by kicks: over the steps from m to n, M (v(n) - v(m)) = dt (F(m)/2 + F(m+1) + ... + F(n-1) + F(n)/2) at any step.
 So the force at the ends of a row and its mean over the row give the impulse to round-off."""
 
 from __future__ import annotations

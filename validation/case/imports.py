@@ -201,7 +201,7 @@ def _compiled(place: Path) -> Iterable[Path]:
 
 
 def _label(path: Path, folder: Path | None = None, label: str = "") -> str:
-    """The place within the package, the same in every installation; of other files that in `folder`, of the `label`, or their names."""
+    """Name of a file wherever it is installed: its place in the package; else `label` and its place below `folder`; else its file name."""
     for root in map(Path, dembark.__path__):
         if path.is_relative_to(root):
             place = path.relative_to(root)

@@ -15,8 +15,8 @@ _MOST = 100_000
 def decides(deviation: float, own: float, reference: float, tolerance: float, basis: str) -> str:
     """What decides a check whose deviation has the half-widths `own` of the value, with this `basis`, and `reference`.
 
-    All in the unit of the tolerance. A deviation that stays as it is passes when all of its interval is within the tolerance, and fails
-    when all of it is beyond or it is as narrow as the tolerance.
+    All in the unit of the tolerance. A deviation that stays as it is passes once all of its interval is within the tolerance, and fails
+    once all of it is beyond or its half-width is no more than that.
     """
     if not (math.isfinite(deviation) and math.isfinite(reference)):
         return "a reference with an interval" if math.isfinite(deviation) else ""
