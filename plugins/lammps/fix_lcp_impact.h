@@ -8,7 +8,7 @@ namespace LAMMPS_NS {
 
 class FixLcpImpact : public dembark_family::ImpactFix {
  public:
-  FixLcpImpact(LAMMPS* lmp, int narg, char** arg) : ImpactFix(lmp, narg, arg, nullptr) { time_depend = 1; }
+  FixLcpImpact(LAMMPS* lmp, int narg, char** arg) : ImpactFix(lmp, narg, arg, nullptr) {}
 };
 
 }  // namespace LAMMPS_NS

@@ -18,6 +18,7 @@ ImpactFix::ImpactFix(LAMMPS* lmp, int narg, char** arg, const char* mesh) : Shar
   if (!atom->tag_enable) fail("atoms have no numbers; use atom_modify id yes");
   checked([&] { impacts_ = std::make_unique<Coupling>(read_command({arg + std::min(3, narg), arg + narg}, atom->ntypes, mesh)); });
   restart_global = 1;
+  time_depend = 1;
   vector_flag = 1;
   size_vector = int(dembark::to_numbers(impacts_->report).size());
   extvector = 0;
@@ -70,11 +71,20 @@ void ImpactFix::check_order() const {
   }
 }
 
+/// Of the fixes that move grains of this one, which have to agree. Collective.
 double ImpactFix::find_torque_scale() const {
-  double own = own_inertia();
-  for (const Fix* const fix : fixes())
-    if (begins_with(fix->style, "nve/sphere")) own = inertia_of(*fix);
-  return impacts_->command.torque_scale(own);
+  const Fix* mover = nullptr;
+  for (const Fix* const fix : fixes()) {
+    if (!begins_with(fix->style, "nve/sphere")) continue;
+    int here = 0, any = 0;
+    for (int i = 0; i < atom->nlocal; ++i) here |= (atom->mask[i] & groupbit) && (atom->mask[i] & fix->groupbit);
+    MPI_Allreduce(&here, &any, 1, MPI_INT, MPI_MAX, world);
+    if (!any) continue;
+    if (mover && inertia_of(*fix) != inertia_of(*mover))
+      fail(std::string("fixes ") + mover->id + " and " + fix->id + " (nve/sphere) turn its grains with different moments of inertia");
+    mover = fix;
+  }
+  return impacts_->command.torque_scale(mover ? inertia_of(*mover) : own_inertia());
 }
 
 PeriodicBox ImpactFix::box() const {

@@ -30,6 +30,7 @@ ResumeFix::ResumeFix(LAMMPS* lmp, int narg, char** arg) : SharedFix(lmp, narg, a
   if (base_.find_first_of("*%") != std::string::npos) fail("the name of the states must not hold * or %");
   outputs_.assign(arg + std::min(narg, 6), arg + narg);
   restart_global = 1;
+  time_depend = 1;  // the newest state is that of the highest step
   force_reneighbor = every_ > 0;
   next_reneighbor = -1;
 }

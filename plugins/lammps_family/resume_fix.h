@@ -13,6 +13,7 @@
 
 #include "shared_fix.h"
 
+#include "dembark/fnv.hpp"
 #include "dembark/restart/run_record.hpp"
 #include "dembark/restart/state_files.hpp"
 
@@ -22,15 +23,15 @@ namespace dembark_family {
 class OrderHash {
  public:
   OrderHash(const LAMMPS_NS::Atom& atom, const LAMMPS_NS::NeighList* list);
-  void mix(std::uint64_t v) {  // FNV-1a, 32 bits at a time
-    hash_ = (hash_ ^ static_cast<std::uint32_t>(v)) * 1099511628211u;
-    if (v >> 32) hash_ = (hash_ ^ (v >> 32)) * 1099511628211u;
+  void mix(std::uint64_t v) {  // 32 bits at a time
+    hash_ = dembark::fnv1a_next(hash_, static_cast<std::uint32_t>(v));
+    if (v >> 32) hash_ = dembark::fnv1a_next(hash_, v >> 32);
   }
   double high() const { return double(hash_ >> 32); }
   double low() const { return double(hash_ & 0xffffffffu); }
 
  private:
-  std::uint64_t hash_ = 1469598103934665603u;
+  std::uint64_t hash_ = dembark::fnv1a_start;
 };
 
 class ResumeFix : public SharedFix {

@@ -95,7 +95,8 @@ states::RunRecord ResumeFix::record() const {
   std::string acting;
   for (Fix* const fix : fixes()) {
     if (fix == this) continue;
-    add("fix " + word(fix->id), fix->style);
+    const auto* const own = dynamic_cast<const SharedFix*>(fix);
+    add("fix " + word(fix->id), fix->style + (own && !own->words.empty() ? " " + own->words : ""));
     if (is(*fix, "gravity")) {
       const dembark::Vec3<double> g = acceleration_of(fix)();
       add("acceleration of fix " + word(fix->id), states::digits(g.x, g.y, g.z));

@@ -1,5 +1,7 @@
 #include "shared_fix.h"
 
+#include <algorithm>
+#include <cctype>
 #include <climits>
 #include <cstdlib>
 #include <cstring>
@@ -8,6 +10,20 @@
 using namespace LAMMPS_NS;
 
 namespace dembark_family {
+namespace {
+
+/// In one line, as states keep it.
+std::string line_of(int count, char** words) {
+  std::string line;
+  for (int k = 0; k < count; ++k) line += (k ? " " : "") + std::string(words[k]);
+  std::replace_if(line.begin(), line.end(), [](unsigned char c) { return std::isspace(c); }, ' ');
+  return line;
+}
+
+}  // namespace
+
+SharedFix::SharedFix(LAMMPS* lmp, int narg, char** arg)
+    : EngineFix(lmp, narg, arg), words(line_of(std::max(narg - 3, 0), arg + std::min(narg, 3))) {}
 
 std::string units_error(const Force& force, const Update& update) {
   if (force.ftm2v == 1.0 && force.mvv2e == 1.0) return "";

@@ -88,7 +88,9 @@ typedef std::vector<std::pair<const void*, std::size_t>> Pieces;
 
 class SharedFix : public dembark_engine::EngineFix {
  public:
-  using EngineFix::EngineFix;
+  SharedFix(LAMMPS_NS::LAMMPS* lmp, int narg, char** arg);
+
+  const std::string words;  ///< of the command, behind the style
 
  protected:
   static bool begins_with(const std::string& text, const char* with) { return text.rfind(with, 0) == 0; }

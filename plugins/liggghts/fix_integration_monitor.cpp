@@ -45,6 +45,9 @@ void FixIntegrationMonitor::find_contacts() {
   hertz_ = pair_->contact_match("normal", "hertz");
   if (!hertz_ && !pair_->contact_match("normal", "hooke"))
     fail("it knows the stiffness of model hertz or hooke only; the pair style has another model");
+  for (FixWallGran *const wall : walls_)
+    if (!wall->contact_match("normal", hertz_ ? "hertz" : "hooke"))
+      fail(std::string("it knows the stiffness of walls with the normal model of the pair style only; fix ") + wall->id + " has another");
   const dembark_liggghts::PropertyReader read(force->registry, modify, error, "fix integration/monitor");
   using dembark::ContactNumber;
   if (!hertz_) characteristic_velocity_ = dembark_liggghts::PropertySource(read, 1, 1).number(ContactNumber::characteristic_velocity);

@@ -25,6 +25,7 @@
 #include "variable.h"
 #include "write_restart.h"
 
+#include "dembark/fnv.hpp"
 #include "engine_access.h"
 
 using namespace LAMMPS_NS;
@@ -37,13 +38,12 @@ struct Head {
   double step, ranks, contact_distance_factor;
 };
 
-/// FNV-1a, 64 bits at a time.
 std::uint64_t hash_of(const std::vector<double> &numbers) {
-  std::uint64_t hash = 1469598103934665603u;
+  std::uint64_t hash = dembark::fnv1a_start;
   for (const double &number : numbers) {
     std::uint64_t bits;
     std::memcpy(&bits, &number, sizeof bits);
-    hash = (hash ^ bits) * 1099511628211u;
+    hash = dembark::fnv1a_next(hash, bits);
   }
   return hash;
 }
@@ -65,15 +65,18 @@ std::vector<Style *> fixes(Modify *modify) {
 }
 
 /// Numbers that have to be the same for the saved ones to belong to this run: which atoms in which order, their candidates in which order,
-/// which properties and meshes.
+/// which properties and meshes, with how many numbers a contact.
 std::vector<double> structure(Atom *atom, Force *force, Modify *modify) {
   dembark_family::OrderHash order(*atom, contact_list(force));
   for (FixPropertyAtom *property : fixes<FixPropertyAtom>(modify)) {
     for (const char *c = property->id; *c; ++c) order.mix(*c);
     order.mix(property->get_nvalues());
   }
-  for (FixContactHistoryMesh *history : fixes<FixContactHistoryMesh>(modify))
+  order.mix(atom->torque_flag);
+  for (FixContactHistoryMesh *history : fixes<FixContactHistoryMesh>(modify)) {
+    order.mix(history->get_dnum());
     for (int i = 0; i < atom->nlocal; ++i) order.mix(history->nneighs(i));
+  }
   return {double(atom->nlocal), double(atom->nghost), order.high(), order.low()};
 }
 
@@ -84,9 +87,10 @@ struct Stream {
   std::size_t at = data.size();  // of the next number
 
   void numbers(double *values, int count) {
-    if (loading) std::copy_n(data.data() + at, count, values);
-    else data.insert(data.end(), values, values + count);
-    at += std::size_t(count);
+    const std::size_t next = at + std::size_t(count);
+    if (!loading) data.insert(data.end(), values, values + count);
+    else if (next <= data.size()) std::copy_n(data.data() + at, count, values);
+    at = next;  // beyond the end: the numbers are not those of this run
   }
   template <class Integer>
   void integer(Integer &value) {
@@ -96,8 +100,8 @@ struct Stream {
   }
 };
 
-/// What a rank has to know to go on: forces, properties, histories of meshes, histories of pairs.
-void visit(Stream stream, Atom *atom, Force *force, Modify *modify) {
+/// What a rank has to know to go on: forces, properties, histories of meshes, histories of pairs. How many numbers these are.
+std::size_t visit(Stream stream, Atom *atom, Force *force, Modify *modify) {
   const int n = atom->nlocal;
   stream.integer(atom->nextsort);
   if (n) stream.numbers(atom->f[0], 3 * n);
@@ -114,7 +118,7 @@ void visit(Stream stream, Atom *atom, Force *force, Modify *modify) {
       }
     }
   NeighList *const list = contact_list(force);
-  if (!list) return;
+  if (!list) return stream.at;
   const int width = granular_pair(force)->dnum();
   for (int ii = 0; ii < list->inum; ++ii) {
     const int i = list->ilist[ii];
@@ -133,6 +137,7 @@ void visit(Stream stream, Atom *atom, Force *force, Modify *modify) {
       }
     }
   }
+  return stream.at;
 }
 
 }  // namespace
@@ -147,7 +152,8 @@ void FixResumeExact::setup(int) {
   if (state_step_ < 0) return;
   const std::vector<double> facts = structure(atom, force, modify);
   std::string why = why_not_put_back(part_.size() > facts.size() && std::equal(facts.begin(), facts.end(), part_.begin()));
-  if (why.empty()) visit({part_, true, facts.size()}, atom, force, modify);
+  if (why.empty() && visit({part_, true, facts.size()}, atom, force, modify) != part_.size())
+    fail_alone("the state holds other forces and histories than this run has; continue with the script that wrote it");
   const std::string differences = why_approximate(record());
   if (!differences.empty()) why += (why.empty() ? "" : "; ") + differences;
   go_on(why);

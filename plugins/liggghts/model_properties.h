@@ -20,6 +20,7 @@
 
 #include "dembark/capillary/bridge_law.hpp"
 #include "dembark/contact.hpp"
+#include "dembark/message_text.hpp"
 #include "dembark/pair_table.hpp"
 #include "dembark/parameters/contact_parameters.hpp"
 #include "engine_access.h"
@@ -29,18 +30,15 @@ namespace dembark_liggghts {
 /// A keyword with named values, e.g. `presliding linear|exponential`.
 template <class Option>
 class ChoiceSetting : public EnumSetting<Option> {
-  std::string choices_;
+  std::vector<std::string> values_;
 
  public:
-  ChoiceSetting(const std::string& name, const std::vector<std::string>& values) : EnumSetting<Option>(name) {
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      this->addOption(values[i], static_cast<Option>(i));
-      choices_ += (i ? ", " : "") + values[i];
-    }
+  ChoiceSetting(const std::string& name, const std::vector<std::string>& values) : EnumSetting<Option>(name), values_(values) {
+    for (std::size_t i = 0; i < values.size(); ++i) this->addOption(values[i], static_cast<Option>(i));
   }
   int parseArguments(char** args) override {
     const int consumed = EnumSetting<Option>::parseArguments(args);
-    if (consumed < 0) this->error_message = this->name + " '" + args[1] + "' is unknown; it can be " + choices_;
+    if (consumed < 0) this->error_message = this->name + " '" + args[1] + "' is unknown; it can be " + dembark::names_text(values_);
     return consumed;
   }
 };

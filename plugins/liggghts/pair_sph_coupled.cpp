@@ -90,6 +90,9 @@ void PairSphCoupled::coeff(int narg, char **arg) {
     memory->create(cutsq, n + 1, n + 1, "pair:cutsq");
     for (int i = 1; i <= n; ++i) std::fill_n(setflag[i] + 1, n, 0);
   }
+  if (all_types_)  // of a restart file, which does not say which
+    for (int i = 1; i <= n; ++i) std::fill_n(setflag[i] + 1, n, 0);
+  all_types_ = false;
   int low_i, high_i, low_j, high_j;
   force->bounds(arg[0], n, low_i, high_i);
   force->bounds(arg[1], n, low_j, high_j);

@@ -70,6 +70,7 @@ class PairSphCoupled : public Pair {
   void store(bool moved);
 
   std::vector<std::string> words_;
+  bool all_types_ = false;  // until the first pair_coeff behind a restart file
   dembark::sph::Scene scene_;
   std::unique_ptr<dembark::sph::Passes> passes_;
   dembark_liggghts::SphFilms films_;

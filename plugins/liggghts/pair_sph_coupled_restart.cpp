@@ -32,4 +32,5 @@ void PairSphCoupled::read_restart(FILE *file, const int, const int) {
   char all[] = "*";
   char *types[] = {all, all};
   coeff(2, types);
+  all_types_ = true;
 }

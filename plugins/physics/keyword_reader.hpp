@@ -58,12 +58,9 @@ class Reader {
   }
   int choice(const std::string& of, const std::string& what, const std::vector<std::string>& all) {
     const std::string found = word(of, what);
-    std::string list;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      if (found == all[i]) return int(i);
-      list += (i ? ", " : "") + all[i];
-    }
-    refuse(of + ": " + what + " is one of " + list + ", not '" + found + "'");
+    int option = 0;
+    if (!option_from_name(all, found, option)) refuse(of + ": " + what + " can be " + names_text(all) + ", not '" + found + "'");
+    return option;
   }
 
   static bool is_number(const std::string& word, double& value) {

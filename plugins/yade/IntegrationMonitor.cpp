@@ -129,7 +129,7 @@ void IntegrationMonitor::action() {
 	// Steps that were not seen, or were of another length, are no history.
 	if (n != step + 1 || scene->dt != run.step()) histories.clear();
 	if (scene->dt != run.step()) run.take_step(scene->dt);
-	if (run.interval_end() <= step) run.begin(scene->dt, n);
+	if (n < step || run.interval_end() <= step) run.begin(scene->dt, n);
 	step = n;
 	scene->forces.sync();
 	followImpacts(newton);

@@ -19,6 +19,23 @@ def test_sliding_becomes_rolling(tmp_path, factor, words, settings):
     rolled(tmp_path, factor, words, "lammps", **settings)
 
 
+@pytest.mark.parametrize(("group", "says"), [("two id 2", "fixes two and motion (nve/sphere) turn its grains with different moments"),
+                                             ("two empty", "")])
+def test_movers_of_different_inertia_are_refused(tmp_path, group, says):
+    """Of grains that both move; a mover of none of its grains does not matter."""
+    settings = {**FLAT, "motion": "nve/sphere disc", "before": f"group {group}\nfix two two nve/sphere"}
+    case = Case([Log((0.0, 0.0)), Log((0.5, 0.0))], "stiffness 1e7", 1e-5, "run 1", **settings)
+    done = impact_decks.start(tmp_path, case, engine="lammps")
+    assert says in one_line(done) if says else done.code == 0, done.output[-1500:]
+
+
+@pytest.mark.parametrize("engine", ["lammps", "liggghts"])
+def test_steps_are_not_counted_anew(tmp_path, engine):
+    case = Case([Log((0.0, 0.0)), Log((0.5, 0.0))], "stiffness 1e7", 1e-5, "run 1\nreset_timestep 0\nrun 1")
+    done = impact_decks.start(tmp_path, case, engine=engine)
+    assert done.code != 0 and "reset timestep" in done.output + done.error, done.output[-1500:]
+
+
 def test_beside_pair_forces(tmp_path):
     """A pair style for other atoms: excluded from each other's neighbour lists, the logs feel nothing of it."""
     pair = """pair_style dembark/granular
@@ -43,7 +60,7 @@ def one_line(done):
 @pytest.mark.parametrize(("words", "says"), [
     ("", "stiffness is missing: one value (N/m) for each atom type"),
     ("stiffness 1e7 frction 0.3", "'frction' is no keyword; there is stiffness, damping"),
-    ("stiffness 1e7 wall mesh floor stl stiffness 1e7", "wall: the shape is one of plane, cylinder, not 'mesh'"),
+    ("stiffness 1e7 wall mesh floor stl stiffness 1e7", "wall: the shape can be plane or cylinder, not 'mesh'"),
     ("stiffness 1e7 impacts no/such/folder/file.txt", "impacts: file no/such/folder/file.txt cannot be written"),
 ])
 def test_bad_words(tmp_path, words, says):

@@ -132,6 +132,11 @@ def test_what_does_not_fit_is_refused(tmp_path):
     assert "exactly" not in run(tmp_path, text, ranks=2)
 
 
+def test_steps_are_not_counted_anew(tmp_path):
+    """The newest state is that of the highest step."""
+    refused(tmp_path, deck("run 250\nreset_timestep 0\nrun 250"), "reset")
+
+
 def test_states_of_ranks_that_fix_balance_divided_are_refused(tmp_path):
     """The cuts are not in a restart file, and those of a new run are others: a run says so before it writes states."""
     states = "fix cuts all balance 100 1.0 shift z 10 1.0\n" + EVERY_200
@@ -236,12 +241,14 @@ def test_what_another_run_changed_is_named(tmp_path):
     run(tmp_path, deck("run 250"))
     other = deck("run 210 upto", resume=True)
     for old, new in (("timestep 1e-5", "timestep 2e-5"), ("gravity 9.81", "gravity 9.8"), ("static_friction 0.6", "static_friction 0.65"),
+                     ("wall/dembark region floor type 3", "wall/dembark region floor type 1"),
                      ("fix motion", "group low region floor\ngroup some type 1\nfix extra some setforce NULL NULL NULL\nfix motion")):
         other = other.replace(old, new)
     other = "\n".join(line for line in other.splitlines() if "fix table" not in line) + "\n"
     said = run(tmp_path, other)
     reasons = next(line for line in said.splitlines() if "dembark: resumed at step 200 approximately: " in line)
     for reason in ("timestep was 1.0000000000000001e-05, and is 2.0000000000000002e-05", "acceleration of fix weight was 0 0 -9.81",
+                   "fix floor was wall/dembark region floor type 3, and is wall/dembark region floor type 1",
                    "coefficients of the pair style changed", "fix extra (setforce) is not in the state",
                    "fix table (print) of the state is missing", "number of atoms of group some (24) is not in the state"):
         assert reason in reasons, reasons

@@ -193,6 +193,14 @@ def test_mistakes_are_told_in_one_line(tmp_path, words, told):
     assert len(errors) == 1 and told in errors[0], done.output[-1500:]
 
 
+def test_walls_of_another_normal_model_are_refused(tmp_path):
+    text = bed("speed 1")
+    wall = next(line for line in text.splitlines() if "wall/gran" in line)
+    assert "model hertz" in wall
+    done = run_deck(tmp_path, text.replace(wall, wall.replace("model hertz", "model hooke")))
+    assert done.code != 0 and "walls with the normal model of the pair style only" in done.error, done.output[-1500:]
+
+
 def test_what_it_cannot_judge_is_told(tmp_path):
     stock = bed("speed 1 impacts 1").replace("tangential finnie_rabinowicz", "tangential history").replace(" presliding linear", "")
     for k, (text, told) in enumerate(((stock, "tangential finnie_rabinowicz only"),

@@ -99,6 +99,12 @@ def test_other_models_than_those_of_the_state_are_refused_or_approximate(tmp_pat
     assert done.code == 0 and "dembark: resumed at step 200 approximately: the atoms or their candidates" in done.output
 
 
+def test_steps_are_not_counted_anew(tmp_path):
+    """The newest state is that of the highest step."""
+    done = run_deck(tmp_path, bed(False, STATES.format(every=100) + "run 150\nreset_timestep 0\nrun 150", ranks=1))
+    assert done.code != 0 and "reset" in done.error, done.output[-1000:]
+
+
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_run_that_begins_anew_deletes_no_state(tmp_path, ranks):
     """States of an earlier run in the folder: the run ends with one line before anything is written over."""
@@ -214,6 +220,17 @@ def test_fixes_of_the_list_are_resumed_exactly(tmp_path, ranks):
     for name in ("grains.dump", "means.txt"):
         assert (whole / name).read_bytes() == (broken / name).read_bytes(), name
     assert liggghts_driver.read_dump(broken / "grains.dump")[0].tolist() == [0, 500]
+
+
+def test_histories_of_another_length_are_refused(tmp_path):
+    """A mesh wall that has lost its bridges: a contact has fewer numbers than in the state, with the pair style as it was."""
+    states = STATES.format(every=200)
+    for material, run_command, resume in ((BED, "run 250", False), (replace(BED, bridge_volume=0.0), "run 260 upto", True)):
+        wall = liggghts_driver.models(material, wall="mesh n_meshes 1 meshes plate")
+        lines = f"fix plate all mesh/surface file plate.stl type 2\nfix wall all wall/gran {wall}\nfix motion all nve/sphere\n"
+        done = run_deck(tmp_path, with_fixes(tmp_path, bed(False, states + run_command, ranks=1, resume=resume), lines))
+        assert (done.code == 0) != resume, done.error or done.output[-1500:]
+    assert "used different contact history model" in done.error
 
 
 INEXACT = {

@@ -107,7 +107,7 @@ REFUSED = {
     "spacing": ("spacing 0.02", "", "spacing (m) is missing"),
     "sound": ("sound_speed 30.0", "", "sound_speed (m/s) is missing"),
     "number": ("spacing 0.02", "spacing wide", "dx (m) must be a number, not 'wide'"),
-    "kernel": ("sound_speed 30.0 ", "sound_speed 30.0 kernel gauss", "the kernel is one of wendland_c2, cubic_spline, not 'gauss'"),
+    "kernel": ("sound_speed 30.0 ", "sound_speed 30.0 kernel gauss", "the kernel can be wendland_c2 or cubic_spline, not 'gauss'"),
     "empty body": ("fix body3 g3", "group none type 99\nfix body3 none", "its group has no atoms"),
     "no mass": ("mass 6.4 ", "", "mass is missing"),
     "no inertia": ("inertia 0.009 ", "", "inertia is missing"),

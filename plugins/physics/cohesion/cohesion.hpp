@@ -73,8 +73,9 @@ DEMBARK_FUNCTION inline double cohesion_step(const Cohesion& cohesion, const Coh
   const double radius = reduced(c.radius_1, c.radius_2), work = cohesion.work_of_adhesion;
   switch (cohesion.law) {
     case CohesionLaw::none: break;
-    case CohesionLaw::constant: return c.touching ? cohesion.cohesive_force : 0.0;
-    case CohesionLaw::dmt: return c.touching ? dmt_pull_off(work, radius) : 0.0;
+    // These two keep nothing: whatever another law left ends here.
+    case CohesionLaw::constant: state = {}; return c.touching ? cohesion.cohesive_force : 0.0;
+    case CohesionLaw::dmt: state = {}; return c.touching ? dmt_pull_off(work, radius) : 0.0;
     case CohesionLaw::jkr:
       if (c.touching) state.rupture_distance = cohesion_reach(cohesion, c.radius_1, c.radius_2, c.effective_youngs_modulus, 0.0);
       if (state.held() && c.gap <= state.rupture_distance) return jkr_attraction(work, radius, c.effective_youngs_modulus, -c.gap);

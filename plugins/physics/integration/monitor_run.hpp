@@ -163,7 +163,8 @@ class MonitorRun {
   /// the last run is the new nominal time step.
   void begin(double h, long n) {
     if (state_.step == 0.0 || (h != step() && h != state_.step)) take_step(h);
-    if (rows > 0 && state_.interval_end <= double(n)) state_.interval_end = double(n) + std::ldexp(rows, level());
+    const double end = double(n) + std::ldexp(rows, level());  // of an interval that begins now: no other is later, unless steps began anew
+    if (rows > 0 && (state_.interval_end <= double(n) || state_.interval_end > end)) state_.interval_end = end;
   }
   double step() const { return std::ldexp(state_.step, -level()); }  ///< s, of the steps to come
   int level() const { return int(state_.level); }                    ///< step() is the nominal time step over 2^level

@@ -220,7 +220,6 @@ class Table {
     to.velocity += (1.0 / width) * (chord + (1.0 - 2.0 * s) * (r * bend_a + s * bend_b) + (s * r) * (bend_b - bend_a));
     to.acceleration += (2.0 / (width * width)) * (bend_b - 2.0 * bend_a + (3.0 * s) * (bend_a - bend_b));
   }
-  const std::vector<TableRow>& rows() const { return rows_; }
 
  private:
   std::vector<TableRow> rows_;

@@ -151,7 +151,8 @@ class TextReader {
       // Not by the C library, whose decimal point is that of the user's language.
       const char* const from = first_ + (*first_ == '+' && first_ + 1 < at_ && first_[1] != '-');
       const auto [to, error] = std::from_chars(from, at_, each);
-      if (error == std::errc::result_out_of_range && std::find(from, at_, '-') != at_) each = 0.0;  // too small
+      const char* const exponent = std::find_if(from, at_, [](char c) { return c == 'e' || c == 'E'; });
+      if (error == std::errc::result_out_of_range && std::find(exponent, at_, '-') != at_) each = 0.0;  // too small
       else if (error != std::errc() || to != at_ || !std::isfinite(each)) wrong("'" + std::string(first_, at_) + "' is not a number");
     }
     found_.triangles.back().node[corners_++] = {x[0], x[1], x[2]};

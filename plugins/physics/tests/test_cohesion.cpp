@@ -102,6 +102,23 @@ TEST_CASE("an impact loses the work between touch and rupture, or sticks", "[coh
   CHECK(rebound(CohesionLaw::jkr, 0.8 * sticking, 400) == 0.0);
 }
 
+TEST_CASE("what another law left of a contact ends with the law", "[cohesion]") {
+  const CohesionContact touching = [] {
+    CohesionContact c;
+    c.radius_1 = c.radius_2 = R;
+    c.effective_youngs_modulus = E;
+    c.touching = true;
+    return c;
+  }();
+  for (const CohesionLaw law : {CohesionLaw::none, CohesionLaw::constant, CohesionLaw::dmt}) {
+    CohesionState state;
+    cohesion_step(adhesion(CohesionLaw::jkr), touching, state);
+    REQUIRE(state.held());
+    cohesion_step(adhesion(law), touching, state);
+    CHECK_FALSE(state.held());
+  }
+}
+
 TEST_CASE("equal spheres have the force of half the radius against a wall", "[cohesion]") {
   CohesionState one, other;
   for (const CohesionLaw law : {CohesionLaw::dmt, CohesionLaw::jkr})

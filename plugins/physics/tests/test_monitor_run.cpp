@@ -46,6 +46,16 @@ TEST_CASE("monitor: what was saved comes back", "[monitor]") {
   CHECK(again.step() == 1e-5);
 }
 
+TEST_CASE("monitor: an interval ends in time when the engine counts its steps anew", "[monitor]") {
+  MonitorRun run(MonitorCommand::read({"speed", "2", "length", "0.005", "action", "adapt", "rows", "100"}));
+  run.begin(1e-5, 1000000);
+  CHECK(run.interval_end() == 1000100);
+  run.begin(1e-5, 1000040);
+  CHECK(run.interval_end() == 1000100);
+  run.begin(1e-5, 0);
+  CHECK(run.interval_end() == 100);
+}
+
 TEST_CASE("monitor: on another number of processes the first has the tallies of all", "[monitor]") {
   const MonitorRun run = used();
   const std::vector<double> saved = run.saved({run.state(), run.state()});

@@ -140,6 +140,25 @@ def test_a_wrong_word_for_restarts_is_one_line_and_code_2(yade, word, parts):
     assert_one_line(done, parts)
 
 
+def test_a_run_does_not_contradict_the_words_that_its_writers_have_read(yade):
+    done = yade(script(yade, "wrong", "dembark.run(1, resume=True)\nprint('went on')\n"))
+    assert_one_line(done, ("resume=True", "start it with resume=yes"))
+
+
+def test_means_of_two_kinds_come_back_as_they_were(yade):
+    done = yade(script(yade, "means", """
+        one, other = dembark.StepMeans(10), dembark.StepMeans(20)
+        O.dt, O.engines = 1e-3, []
+        O.run(1, True)
+        one.add(1.0, 2.0), other.add(3.0)
+        one.save(), other.save()
+        one.sums, other.sums = [], []
+        one.load(), other.load()
+        print("found", one.sums, other.sums)
+        """))
+    assert "found [1.0, 2.0] [3.0]" in done.stdout, done.stderr
+
+
 def test_output_files_are_cut_behind_the_state_or_left(yade):
     """To their length in the state; by their format if the state does not know them; never when their rows do not begin with the step."""
     frame = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\nITEM: ATOMS id\n7\n"

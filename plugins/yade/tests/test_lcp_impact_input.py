@@ -71,6 +71,7 @@ CASES = [
     ("step(friction=dict(static=0.3, kinetic=0.5))", ("LcpImpact.friction", "kinetic friction must not exceed")),
     ("step(friction=dict(static=0.3, speed=0.5))", ("'speed' is unknown", "static, kinetic, slip")),
     ("step(friction=dict(kinetic=0.5))", ("has no 'static'",)),
+    ("step(friction={(bark, bark): 0.3, ('bark', bark): 0.4})", ("LcpImpact.friction", "is given twice")),
     ("step(friction={bark: 0.3})", ("the key 0 is no pair",)),
     ("step(friction={(bark, bark): 0.3})", ("walls[0] 'floor' has no friction", "give the wall its own")),
     ("step(walls=floor)", ("LcpImpact.walls must be a list",)),

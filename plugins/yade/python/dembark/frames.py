@@ -1,5 +1,7 @@
 """Frames of all bodies and a history with all digits, so that runs can be compared to round-off."""
 
+from itertools import count
+
 from yade import Omega, Sphere
 from yade.dembark.scene import box
 from yade.dembark.states import options, table
@@ -33,7 +35,11 @@ class StepMeans:
     Those that have begun belong to a saved scene: give `save` and `load` to `run` as `saving` and `loaded`.
     """
 
+    _numbers = count()
+
     def __init__(self, every):
+        # By its place in the script, which is the same when the run is resumed.
+        self._tag = f"sums{next(self._numbers) or ''}"
         self.every = every
         self.sums = []
 
@@ -49,11 +55,11 @@ class StepMeans:
 
     def save(self):
         """Write the sums into the scene."""
-        O.tags["sums"] = " ".join(value.hex() for value in self.sums)
+        O.tags[self._tag] = " ".join(value.hex() for value in self.sums)
 
     def load(self):
         """The sums as they are in the scene."""
-        self.sums = [float.fromhex(word) for word in O.tags["sums"].split()]
+        self.sums = [float.fromhex(word) for word in O.tags[self._tag].split()]
 
 
 class FrameWriter:

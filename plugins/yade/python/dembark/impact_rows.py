@@ -21,11 +21,15 @@ def read(kind, value, name):
     keys = KEYS[kind]
     if not isinstance(value, dict) or not value or (keys == 2 and isinstance(next(iter(value)), str)):
         return [*[-1.0] * keys, *_values(kind, value, name)]
-    rows = []
+    rows, pairs = [], set()
     for key, each in value.items():
         if keys == 2 and not (isinstance(key, tuple) and len(key) == 2):
             fail(f"{name}: the key {key} is no pair; write {{(material, material): friction, ...}}")
-        rows += [_material(one, name) for one in (key if keys == 2 else (key,))]
+        materials = [_material(one, name) for one in (key if keys == 2 else (key,))]
+        if frozenset(materials) in pairs:
+            fail(f"{name}: the key {key} is given twice")
+        pairs.add(frozenset(materials))
+        rows += materials
         rows += _values(kind, each, f"{name}[{key}]")
     return rows
 

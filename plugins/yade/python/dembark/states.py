@@ -57,16 +57,18 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
         saving=None, loaded=None):
     """Run the scene until step `steps` is written; say how many steps there are, and that it is finished.
 
-    `restart_every` and `resume` are what the words behind the script say unless they are given. Every `restart_every` steps (0: never)
-    the scene is saved as `base`.<step>.yade.gz. With `resume` the newest of these that is whole takes the scene's place, and what
+    `restart_every` is what the words behind the script say unless it is given; `resume` must not contradict them. Every `restart_every`
+    steps (0: never) the scene is saved as `base`.<step>.yade.gz. With `resume` the newest complete one replaces the scene, and what
     `outputs` (tables that begin with the step, and dumps) got after it is cut off, for it comes again. Call it when the scene is
-    complete. It gets an IntegrationMonitor before its NewtonIntegrator if it has none
-    and no clumps. A scene goes on from the saved copy of itself, so
-    that a run that was killed and resumed is the same to the bit as one that was not, on one thread. `saving()` is called before the scene
-    is saved, `loaded()` after it was resumed.
+    complete: it gets an IntegrationMonitor before its NewtonIntegrator, unless it has one, or has clumps. A scene goes on from the
+    saved copy of itself, so that a run that was killed and resumed is the same to the bit as one that was not, on one thread.
+    `saving()` is called before the scene is saved, `loaded()` after it was resumed.
     """
     announce(steps)
     given = options()
+    if resume is not None and resume != given[1]:
+        # The writers have opened their files by the words.
+        fail(f"run(resume={resume}) contradicts the words behind the script; start it with resume={'yes' if resume else 'no'}")
     restart_every = given[0] if restart_every is None else restart_every
     resume = given[1] if resume is None else resume
     if resume:
