@@ -73,7 +73,7 @@ void lammpsplugin_init(void* host, void* handle, void* register_style) {
     reinterpret_cast<RegisterStyle>(register_style)(&style, host);
   };
   style.creator.pair = &create_pair<LAMMPS_NS::PairDembarkGranular>;
-  add("pair", "dembark/granular", "Hertz or Hooke with Finnie-Rabinowicz friction, rolling resistance and liquid bridges");
+  add("pair", "dembark/granular", "Hertz or Hooke with Finnie-Rabinowicz friction, rolling resistance, dry adhesion and liquid bridges");
 #ifdef DEMBARK_KOKKOS
   style.creator.pair = &dembark_lammps::create_kokkos_pair;
   for (const char* const name : {"dembark/granular/kk", "dembark/granular/kk/device"}) add("pair", name, "the same in a Kokkos kernel");
@@ -81,7 +81,7 @@ void lammpsplugin_init(void* host, void* handle, void* register_style) {
   add("fix", "NEIGH_HISTORY/DEMBARK/KK", "histories of its contacts");
 #endif
   style.creator.fix = &create_fix<LAMMPS_NS::FixWallDembark>;
-  add("fix", "wall/dembark", "the same contacts with the surface of a region");
+  add("fix", "wall/dembark", "the same contacts with the surface of a region or of an STL file");
   style.creator.fix = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
   add("fix", "capillary/liquid", "liquid that grains and walls own and lend to bridges");
   style.creator.fix = &create_fix<LAMMPS_NS::FixEnergyAccount>;

@@ -147,7 +147,7 @@ struct EnergyLedger {
   double imposed = 0.0;  ///< kinetic energy that no force made
   double normal_stored = 0.0, tangential_stored = 0.0, rolling_stored = 0.0;
   double first_stored = 0.0;  ///< of the normal springs at the beginning, and what came and went with bodies
-  double spring_ahead = 0.0;  ///< work of the normal springs from the velocities of `work` to the positions of `normal_stored`
+  double spring_ahead = 0.0;  ///< work of the normal springs up to the positions of `normal_stored` that `work` does not hold yet
   Powers::Each work{};
   Powers now;
 

@@ -10,8 +10,8 @@
 //
 // J. Ai, J.-F. Chen, J. M. Rotter & J. Y. Ooi, Powder Technology 206 (2011) 269, models A and C, whose dashpot has no limit below that
 // of the spring: a fast spin would be stopped by it in the first step of a contact. K. Iwashita & M. Oda, J. Eng. Mech. 124 (1998) 285, for
-// k_r = k_t R*^2. (1) cannot hold a body at rest: at most it takes away the rotation of a step, M <= I |w| / dt, so that it never drives.
-// (2) can.
+// k_r = k_t R*^2. (1) cannot hold a body at rest: at most it takes away the rotation of a step, M <= I |w| / dt, contact by contact, so
+// that one contact never drives, but several of a body together may. (2) can.
 //
 // Beside LIGGGHTS-PUBLIC 3.8.0: `cdt` takes the spring of the normal law for N, divides by the whole relative spin (a body that twists
 // rolls more freely) and turns the spin round at rest; `epsd2` takes |N|, so that a contact that damping pulls on resists too, adds up

@@ -74,6 +74,8 @@ def dependencies(*roots: Path) -> Dependencies:
     waiting = [(_label(path), path) for path in roots]
     while waiting:
         name, path = waiting.pop()
+        if files.get(name, path) != path:  # another file of the same name, such as one of the folder above
+            name = f"{path.parent.name}/{name}"
         if name in files:
             continue
         files[name] = path

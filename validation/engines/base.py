@@ -245,7 +245,7 @@ def call(words: Sequence[str | Path], folder: Path, environment: Mapping[str, st
 def digest(files: Iterable[Path]) -> str:
     """SHA-256 over the names and contents of `files`, in whatever order they are given."""
     total = hashlib.sha256()
-    for path in sorted(files):
+    for path in sorted(files, key=lambda path: (path.name, path)):
         total.update(path.name.encode())
         total.update(path.read_bytes())
     return total.hexdigest()

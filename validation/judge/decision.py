@@ -25,11 +25,12 @@ def decides(deviation: float, own: float, reference: float, tolerance: float, ba
     if reference >= target:
         return f"a reference known to ±{target:.2g}, now ±{reference:.2g}"
     wanted = math.sqrt(target**2 - reference**2)
-    enough, longer = f"{PACKINGS} packings or more", f"runs about {(own / wanted) ** 2:.0f} times as long"
+    enough, longer = f"{PACKINGS} packings or more", f"runs about {max((own / wanted) ** 2, 1.1):.2g} times as long"
     if count < PACKINGS or not math.isfinite(own):
         return enough if count == 1.0 or not math.isfinite(own) else f"{enough}, or {longer}"
     if math.isfinite(count):
-        return f"about {smallest(lambda number: rescaled(own, count, number) <= wanted, round(count))} packings"
+        number = smallest(lambda number: rescaled(own, count, number) <= wanted, round(count))
+        return f"about {number} packings" if number < _MOST else f"more than {_MOST} packings"
     return longer if "block" in basis else f"inputs known well enough to change the value by at most ±{wanted:.2g}, now ±{own:.2g}"
 
 

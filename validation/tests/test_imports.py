@@ -103,6 +103,16 @@ def test_cases_may_have_modules_of_one_name(tmp_path: Path) -> None:
     assert [one.NAME for one in found] == ["first", "second"]
 
 
+def test_modules_of_one_name_in_two_folders_of_a_case_are_both_inputs(tmp_path: Path) -> None:
+    """Its own and that of the folder above."""
+    (tmp_path / "own").mkdir()
+    for folder in (tmp_path, tmp_path / "own"):
+        (folder / "util.py").write_text("x = 1\n")
+    code = tmp_path / "own" / "measure.py"
+    code.write_text("from . import util\nfrom .. import util as shared\n")
+    assert set(imports.dependencies(code).files.values()) == {code, tmp_path / "util.py", tmp_path / "own" / "util.py"}
+
+
 def test_a_neighbour_that_comes_later_is_found(tmp_path: Path) -> None:
     """A user's case may change while a process runs."""
     code = tmp_path / "measure.py"

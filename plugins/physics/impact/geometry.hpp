@@ -279,7 +279,8 @@ struct ContactGeometry {
   PairFinder pairs;
   std::vector<Plane> planes;
   std::vector<Drum> drums;
-  std::vector<Mesh> meshes;  ///< without images: at the end of one that goes through to a periodic boundary they would touch an edge
+  /// Periodic images of bodies are not looked for on meshes: where a mesh ends at a periodic boundary they would touch its edge.
+  std::vector<Mesh> meshes;
 
   void find(const std::vector<Body>& bodies, double reach, std::vector<Contact>& contacts) {
     pairs.find(bodies, reach, contacts);

@@ -76,7 +76,7 @@ struct Contact {
   double wall_stiffness = std::numeric_limits<double>::infinity();  ///< walls: s_w, N/m
 };
 
-/// Candidates are gaps that the free motion of a step, times this factor, closes: forces of other contacts close gaps, too.
+/// A gap is a candidate if this factor times the free motion of a step would close it: forces of other contacts close gaps, too.
 constexpr double reach_factor = 2.0;
 
 /// By how much the square of a unit normal may differ from 1.

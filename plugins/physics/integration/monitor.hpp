@@ -35,7 +35,7 @@ enum class MonitorAction {
 inline std::vector<std::string> monitor_action_names() { return {"report", "warn", "stop", "adapt"}; }
 
 struct MonitorSettings {
-  /// A limit of 1e-2: where a contact of Hooke's law begins, a step at ten steps a contact misses up to (pi/10)^2 / 8 of the speed.
+  /// 1e-2 is about what ten steps a contact miss, where one of Hooke's law begins: (pi/10)^2 / 8 = 1.2e-2 of the speed.
   ErrorScales scales{0.0, 0.0, 1e-2};
   long every = 20;            ///< steps from sample to sample, 1 or more
   double least_steps = 10.0;  ///< of the shortest contact, > 0

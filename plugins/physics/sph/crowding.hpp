@@ -13,7 +13,7 @@
 // displacements by up to 0.2 dx along each axis 1.25 (1.3 dx), 1.4 (1 dx), 1.5 (0.8 dx). By (2) a body in the fluid is found at any offset
 // between the lattices if it is two particles wide (h up to 1.3 dx) or four (h of 3 dx).
 //
-// Later states are not judged: a particle that was pressed into a wall is none that was put there.
+// Later states are not judged: a particle pressed into a wall during a run was not put there by the user.
 #pragma once
 
 #include <algorithm>
