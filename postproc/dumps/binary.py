@@ -90,7 +90,7 @@ class BinaryDump(Dump):
                     for _ in range(head.blocks):
                         (length,) = self._take(handle, _BLOCK)
                         if length < 0:
-                            raise DumpError(f"{self.path}, frame {number}: a block of {length} numbers; is this a binary dump of LAMMPS?")
+                            raise DumpError(f"{self.path}, frame {number}: a block of {length} numbers; is this a binary dump?")
                         if not self._source.reach(handle, handle.tell() + 8 * length):
                             raise CutOffError
                 except CutOffError:

@@ -73,10 +73,10 @@ def test_bad_value(tmp_path, name, values, words):
 
 @pytest.mark.parametrize(("old", "new", "words"), [
     ("capillary_model exact", "capillary_model magic", ("capillary_model", "magic", "exact, willett, willett_full, rabinovich, bagheri")),
-    ("presliding linear", "rolling_resistance uphill", ("rolling_resistance", "uphill", "off, constant_torque, elastic_plastic")),
+    ("presliding linear", "rolling_resistance uphill", ("rolling_resistance", "uphill", "off, constant_torque or elastic_plastic")),
     ("presliding linear", "rolling_resistance constant_torque", ("coefficientRollingFriction", "property/global", "fix ID all")),
-    ("presliding linear", "presliding curved", ("presliding", "curved", "linear, exponential, partial_slip")),
-    ("presliding linear", "friction_limit viscous", ("friction_limit", "viscous", "total, elastic")),
+    ("presliding linear", "presliding curved", ("presliding", "curved", "linear, exponential or partial_slip")),
+    ("presliding linear", "friction_limit viscous", ("friction_limit", "viscous", "total or elastic")),
     ("model hertz", "model hertz/stiffness", ("combination", "not compiled", "model hertz/stiffness", "can be hertz, hooke")),
     ("tangential finnie_rabinowicz", "tangential no_history",
      ("not compiled", "tangential no_history", "can be finnie_rabinowicz, history")),

@@ -170,7 +170,7 @@ def test_a_mistake_gets_one_line_before_anything_starts(name: str, write, tmp_pa
     (["small", "--executor", "slrum"], "--executor slrum is neither local, nor slurm, nor the file of a site"),
     (["small", "--jobs", "3"], "--jobs is for a cluster"),
     (["wide", "--cores", "2"], "needs 3 cores, there are 2"),
-    (["large", "--cores", "2"], "needs 1e+03 GB of memory"),
+    (["large", "--cores", "2"], "needs 1 TB of memory"),
     (["smal"], "did you mean small?"),
 ])
 def test_a_wrong_command_gets_one_line(words: list[str], expected: str, decks: Path, tmp_path: Path,
