@@ -35,7 +35,7 @@ case = "silo"
 profile = "quick"
 variant = "dry"
 grid = { wall_friction = [0.3, 0.5] }
-fixed = { grain_count = 200, grain_diameter = "8 mm", settle_time = 0.2, measure_time = 0.1, frames = 5 }
+fixed = { grain_count = 400, grain_diameter = "6 mm", settle_time = 0.3, measure_time = 0.2, frames = 10 }
 
 [resources]
 memory = "400 MB"
