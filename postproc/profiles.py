@@ -28,7 +28,7 @@ def surface_height(centres: Array, radii: Array, area: float) -> float:
     diameter = 2.0 * float(radii.mean())
     levels = np.arange(float((centres - radii).min()), float((centres + radii).max()) + 2.0 * diameter, 0.1 * diameter)
     volume = slice_volumes(centres, radii, levels).sum(axis=0)
-    # One diameter, centred on each cell: an even number of cells would lie half of one beside it.
+    # One diameter, centred on each cell: an even number of cells would be off by half a cell.
     kernel = np.array([0.05, *[0.1] * 9, 0.05])
     smooth = np.convolve(volume, kernel, mode="same") / (area * 0.1 * diameter)
     half = 0.5 * float(np.median(smooth[smooth > 0.05]))

@@ -21,6 +21,7 @@ from .workflow import cancelled_by_signal, conclude
 
 # Stands in the list of runs for the measurements and the report.
 REPORT = "report"
+_LOOK = 5.0  # s, between two tries to measure
 
 
 def _arguments(words: Sequence[str] | None) -> argparse.Namespace:
@@ -48,6 +49,17 @@ def _simulate(folder: Path, place: str, again: bool, cancel: threading.Event) ->
         print(f"dembark: {error}", file=sys.stderr)
 
 
+def _report(folder: Path, cores: int, cancel: threading.Event) -> None:
+    """Wait for another submission that measures: it may have begun before the last runs of this one ended."""
+    while True:
+        try:
+            conclude(folder, cancel, cores)
+            return
+        except Busy:
+            if cancel.wait(_LOOK):
+                raise
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Do one element; returns the exit code."""
     given, cancel = _arguments(words), cancelled_by_signal()
@@ -57,7 +69,7 @@ def main(words: Sequence[str] | None = None) -> int:
         return 0
     try:
         if elements[given.index] == REPORT:
-            conclude(folder, cancel, given.cores)
+            _report(folder, given.cores, cancel)
         else:
             _simulate(folder, elements[given.index], given.again, cancel)
     except DembarkError as error:
