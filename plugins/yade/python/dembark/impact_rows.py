@@ -21,16 +21,15 @@ def read(kind, value, name):
     keys = KEYS[kind]
     if not isinstance(value, dict) or not value or (keys == 2 and isinstance(next(iter(value)), str)):
         return [*[-1.0] * keys, *_values(kind, value, name)]
-    rows, pairs = [], set()
+    rows, known = [], set()
     for key, each in value.items():
         if keys == 2 and not (isinstance(key, tuple) and len(key) == 2):
             fail(f"{name}: the key {key} is no pair; write {{(material, material): friction, ...}}")
         materials = [_material(one, name) for one in (key if keys == 2 else (key,))]
-        if frozenset(materials) in pairs:
+        if frozenset(materials) in known:
             fail(f"{name}: the key {key} is given twice")
-        pairs.add(frozenset(materials))
-        rows += materials
-        rows += _values(kind, each, f"{name}[{key}]")
+        known.add(frozenset(materials))
+        rows += [*materials, *_values(kind, each, f"{name}[{key}]")]
     return rows
 
 

@@ -65,13 +65,12 @@ def run(steps, restart_every=None, resume=None, outputs=("time.csv", "energies.c
     `saving()` is called before the scene is saved, `loaded()` after it was resumed.
     """
     announce(steps)
-    given = options()
-    if resume is not None and resume != given[1]:
+    every, resumes = options()
+    if resume not in (None, resumes):
         # The writers have opened their files by the words.
         fail(f"run(resume={resume}) contradicts the words behind the script; start it with resume={'yes' if resume else 'no'}")
-    restart_every = given[0] if restart_every is None else restart_every
-    resume = given[1] if resume is None else resume
-    if resume:
+    restart_every = every if restart_every is None else restart_every
+    if resumes:
         step = DembarkStates.newest(base)
         if step < 0:
             fail(f"resume=yes: there is no whole state {base}.<step>.yade.gz in this folder; start with restart_every > 0 first")
