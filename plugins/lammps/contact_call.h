@@ -14,10 +14,9 @@ using dembark_family::add;
 using dembark_family::vector;
 
 inline void refuse_time_step(LAMMPS_NS::Error* error, double limit, double dt) {
-  error->one(
-      FLERR,
-      "dembark: with viscous_liquid a bridge between these grains needs a timestep <= {:.3g} s, not {:.3g} s, or a larger minimum gap",
-      limit, dt);
+  error->one(FLERR,
+             "dembark: with viscous_liquid a bridge between these grains needs a timestep <= {:.3g}, not {:.3g}, or a larger minimum gap",
+             limit, dt);
 }
 
 /// The run ends where a bridge that forms cannot be integrated with this time step (s).
@@ -29,7 +28,7 @@ inline void check_time_step(LAMMPS_NS::Error* error, const dembark::Liquid& liqu
 /// The run ends where a bridge that forms is longer than the lists of pairs look.
 inline void check_reach(LAMMPS_NS::Error* error, double rupture_distance, double skin) {
   if (rupture_distance > skin)
-    error->one(FLERR, "pair_style dembark/granular: a bridge reaches {:.3g} m but the neighbor skin is {:.3g} m; use neighbor {:.3g} bin",
+    error->one(FLERR, "pair_style dembark/granular: a bridge reaches {:.3g} but the neighbor skin is {:.3g}; use neighbor {:.3g} bin",
                rupture_distance, skin, 1.01 * rupture_distance);
 }
 

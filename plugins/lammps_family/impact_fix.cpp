@@ -74,16 +74,14 @@ void ImpactFix::check_order() const {
 /// Of the fixes that move grains of this one, which have to agree. Collective.
 double ImpactFix::find_torque_scale() const {
   const Fix* mover = nullptr;
-  int found = 0;  // whether it moves grains; without any yet, the last fix counts
+  bool found = false;  // whether it moves grains; without any yet, the last fix counts
   for (const Fix* const fix : fixes()) {
     if (!begins_with(fix->style, "nve/sphere")) continue;
-    int here = 0, any = 0;
-    for (int i = 0; i < atom->nlocal; ++i) here |= (atom->mask[i] & groupbit) && (atom->mask[i] & fix->groupbit);
-    MPI_Allreduce(&here, &any, 1, MPI_INT, MPI_MAX, world);
+    const bool any = meets(*fix);
     if (any && found && inertia_of(*fix) != inertia_of(*mover))
       fail(std::string("fixes ") + mover->id + " and " + fix->id + " (nve/sphere) turn its grains with different moments of inertia");
     if (any || !found) mover = fix;
-    found |= any;
+    found = found || any;
   }
   return impacts_->command.torque_scale(mover ? inertia_of(*mover) : own_inertia());
 }

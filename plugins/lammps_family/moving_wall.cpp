@@ -66,7 +66,7 @@ std::string MovingWall::outside(const std::vector<Vec3>& middles, const dembark:
   for (int k = 0; k < 3; ++k)
     if ((box.boundary[k][0] == fixed && low[k] < box.boxlo[k]) || (box.boundary[k][1] == fixed && high[k] > box.boxhi[k]))
       return std::string("out of the box along ") + "xyz"[k] + ": it comes from " + number_text(low[k]) + " to " + number_text(high[k]) +
-             " m, and the box is from " + number_text(box.boxlo[k]) + " to " + number_text(box.boxhi[k]) + " m";
+             ", and the box is from " + number_text(box.boxlo[k]) + " to " + number_text(box.boxhi[k]);
   return "";
 }
 

@@ -79,6 +79,13 @@ Fix* SharedFix::fix_of_style(const char* style) const {
   return nullptr;
 }
 
+bool SharedFix::meets(const Fix& fix) const {
+  int here = 0, any = 0;
+  for (int i = 0; i < atom->nlocal; ++i) here |= (atom->mask[i] & groupbit) && (atom->mask[i] & fix.groupbit);
+  MPI_Allreduce(&here, &any, 1, MPI_INT, MPI_MAX, world);
+  return any != 0;
+}
+
 void SharedFix::only_one() const {
   for (const Fix* const fix : fixes())
     if (fix != this && is(*fix, style) && std::strcmp(fix->id, id) != 0)

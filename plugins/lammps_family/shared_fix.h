@@ -99,6 +99,8 @@ class SharedFix : public dembark_engine::EngineFix {
   std::vector<Fix*> fixes() const;
   /// The first of a style, or nullptr.
   Fix* fix_of_style(const char* style) const;
+  /// Whether `fix` has grains of this one's group. Collective.
+  bool meets(const Fix& fix) const;
   void only_one() const;
   void only_verlet() const;
   void only_coherent_units() const;

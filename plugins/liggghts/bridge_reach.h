@@ -71,11 +71,11 @@ inline void check_reach(LAMMPS_NS::Neighbor* neighbor, LAMMPS_NS::Error* error, 
   char line[256];
   if (beyond_skin)
     snprintf(line, sizeof line,
-             "cohesion: a bridge or held contact with a primitive wall reaches %g m but the neighbour skin is %g m; use neighbor %.3g bin",
+             "cohesion: a bridge or held contact with a primitive wall reaches %g but the neighbour skin is %g; use neighbor %.3g bin",
              rupture_distance, neighbor->skin, 1.01 * rupture_distance);
   else
     snprintf(line, sizeof line,
-             "cohesion: a bridge or held contact reaches %g m but neighbours are kept to %g m only; use neigh_modify "
+             "cohesion: a bridge or held contact reaches %g but neighbours are kept to %g only; use neigh_modify "
              "contact_distance_factor %.3g",
              rupture_distance, reach, (1.0 + rupture_distance / size) * 1.01);
   error->one(FLERR, line);

@@ -118,11 +118,9 @@ void FixSphBody::init() {
   if (all == 0.0) fail("its group has no atoms: a body is made of particles");
   place_particles();
   // Then a wall must be put back in each step.
-  int moved = 0;
+  moved_by_others_ = false;
   for (const Fix *const fix : fixes())
-    if (fix->time_integrate && !dynamic_cast<const FixSphBody *>(fix))
-      for (int i = 0; i < atom->nlocal; ++i) moved |= (atom->mask[i] & groupbit) && (atom->mask[i] & fix->groupbit);
-  MPI_Allreduce(&moved, &moved_by_others_, 1, MPI_INT, MPI_MAX, world);
+    if (fix->time_integrate && !dynamic_cast<const FixSphBody *>(fix)) moved_by_others_ = meets(*fix) || moved_by_others_;
 }
 
 /// A state of a restart file has its forces.
@@ -153,17 +151,19 @@ void FixSphBody::gather_forces() {
   int weighed = 0;
   for (int k = 0; k < modify->nfix; ++k)
     if (dynamic_cast<FixGravity *>(modify->fix[k])) weighed |= modify->fix[k]->groupbit;
-  Vector sums[4] = {force_, torque_, {}, {}};
+  Vector mine[4] = {force_, torque_, {}, {}}, sums[4];
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!(atom->mask[i] & groupbit)) continue;
     Vector f = vector(atom->f[i]);
     if (atom->mask[i] & weighed) f -= (atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]]) * gravity_;
-    sums[2] += f;
-    sums[3] += cross(vector(atom->x[i]) - body.position, f);
-    if (atom->torque_flag) sums[3] += vector(atom->torque[i]);
+    mine[2] += f;
+    mine[3] += cross(vector(atom->x[i]) - body.position, f);
+    if (atom->torque_flag) mine[3] += vector(atom->torque[i]);
   }
   static_assert(sizeof sums == 12 * sizeof(double), "numbers only");
-  MPI_Allreduce(MPI_IN_PLACE, sums, 12, MPI_DOUBLE, MPI_SUM, world);
+  // All ranks must have the same bits, which MPI does not promise of MPI_Allreduce.
+  MPI_Reduce(mine, sums, 12, MPI_DOUBLE, MPI_SUM, 0, world);
+  MPI_Bcast(sums, 12, MPI_DOUBLE, 0, world);
   body.force = sums[0];
   body.torque = sums[1];
   body.load = sums[2] - sums[0] + load_;
@@ -218,10 +218,14 @@ void FixSphBody::write_restart(FILE *file) {
 }
 
 void FixSphBody::restart(char *buffer) {
+  const Body given = state_.body;
   checked([&] {
     dembark_family::SavedPart part(buffer);
     part.read(&state_);
     part.end();
   });
+  // Properties are those of the script; only the motion goes on.
+  state_.body.mass = given.mass;
+  state_.body.inertia = given.inertia;
   restarted_ = true;
 }

@@ -62,7 +62,7 @@ class FixSphBody : public dembark_family::SharedFix {
   } state_;
   class FixPropertyAtom *arms_ = nullptr;  // of the particles, in the frame of the body
   dembark::sph::Vector force_{}, torque_{}, load_{}, load_torque_{}, gravity_{};
-  int moved_by_others_ = 0;                // another fix integrates particles of this one
+  bool moved_by_others_ = false;           // another fix integrates particles of this one
   bool restarted_ = false, fresh_ = true;  // fresh: the forces of the set-up are not yet those of the body
 };
 

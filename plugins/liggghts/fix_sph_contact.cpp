@@ -131,9 +131,11 @@ void FixSphContact::push(bool remember) {
 double FixSphContact::compute_vector(int n) { return n == 0 ? contacts_.stored : n == 1 ? contacts_.deepest : double(contacts_.count); }
 
 std::string FixSphContact::written_boxes() const {
-  std::string all;
-  for (const std::string &name : names_) all += "box " + name + " ";
-  return all + "and " + std::to_string(contacts_.planes.size()) + " planes";
+  const auto numbers = [](const Vector &v) { return text(v.x) + " " + text(v.y) + " " + text(v.z); };
+  std::string all = "rounding " + text(contacts_.radius);
+  for (std::size_t k = 0; k < names_.size(); ++k) all += " box " + names_[k] + " " + numbers(2.0 * contacts_.half[k]);
+  for (const ContactPlane &plane : contacts_.planes) all += " plane " + numbers(plane.point) + " " + numbers(plane.normal);
+  return all;
 }
 
 void FixSphContact::write_restart(FILE *file) {
@@ -146,7 +148,7 @@ void FixSphContact::restart(char *buffer) {
   checked([&] {
     dembark_family::SavedPart part(buffer);
     if (const std::string boxes = part.text(); boxes != written_boxes())
-      throw std::invalid_argument("the state has contacts of " + boxes + ", not of " + written_boxes());
+      throw std::invalid_argument("the state has contacts of '" + boxes + "', not of '" + written_boxes() + "'");
     contacts_.stretches = part.rest<Vector>();
   });
 }

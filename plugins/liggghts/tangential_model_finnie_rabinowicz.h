@@ -138,8 +138,8 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
     if (d.contact_history) store(d.contact_history, {});
   }
 
-  inline void beginPass(SurfacesIntersectData&, ForceData&, ForceData&) {
-    if (!pair_) return;
+  inline void beginPass(SurfacesIntersectData& d, ForceData&, ForceData&) {
+    if (!pair_ || !d.computeflag || !d.shearupdate) return;
     dembark_liggghts::end_parted_pairs(*pair_, *atom, neighbor->contactDistanceFactor, CONTACT_TANGENTIAL_MODEL,
                                        [this](int, int, double* history) { store(history, {}); });
   }

@@ -2,7 +2,9 @@
 // files, saved scenes, messages between ranks, tables for Python and comparisons are made from that.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -34,7 +36,9 @@ class Archive {
     if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
       if (!reading_) return numbers_.push_back(double(value));
       if (at_ == numbers_.size()) wrong("are too few for what it says it holds");
-      value = T(numbers_[at_++]);
+      const double number = numbers_[at_++];
+      if constexpr (!std::is_floating_point_v<T>) take_whole(number, value);
+      else value = T(number);
     } else {
       all(value.fields());
     }
@@ -70,6 +74,21 @@ class Archive {
   }
 
  private:
+  /// A conversion of a number that the type does not hold has no defined result.
+  template <class T>
+  void take_whole(double number, T& value) const {
+    if constexpr (std::is_enum_v<T>) {
+      std::underlying_type_t<T> whole{};
+      take_whole(number, whole);
+      value = T(whole);
+    } else {
+      // 2^bits: the largest number itself may be no double.
+      const double beyond = std::ldexp(1.0, std::numeric_limits<T>::digits), least = double(std::numeric_limits<T>::lowest());
+      if (!(number == std::floor(number) && number >= least && number < beyond))
+        wrong("hold a fraction, or one out of range, where an integer is due");
+      value = T(number);
+    }
+  }
   [[noreturn]] void wrong(const char* what) const {
     throw std::invalid_argument("the saved state is incomplete or damaged: its " + std::to_string(numbers_.size()) + " numbers " + what);
   }

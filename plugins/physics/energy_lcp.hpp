@@ -135,12 +135,15 @@ class LcpSolver {
   const LcpResult& solve_islands(const int* outer, const int* inner, const double* value, const Eigen::VectorXd& q,
                                  const LcpOptions& options, const std::vector<char>* start) {
     const bool fill_reducing = options.method == LcpMethod::automatic || options.method == LcpMethod::block;
-    if (islands_.take(outer, inner, value, q.size(), fill_reducing, small_island)) margins_.assign(std::size_t(islands_.count()), {});
+    if (islands_.take(outer, inner, value, q.size(), fill_reducing, small_island)) {
+      margins_.assign(std::size_t(islands_.count()), {});
+      margin_of_all_ = {};
+    }
     order_ = islands_.order();
     load(islands_.whole(), q, start);
     result_.islands = islands_.count();
     // The certificate is that of the whole, so what stops at a tolerance of it cannot go island by island.
-    if (options.method == LcpMethod::pgs && q.size() > 0) solve_block(islands_.whole(), 0, margins_[0], options, start);
+    if (options.method == LcpMethod::pgs && q.size() > 0) solve_block(islands_.whole(), 0, margin_of_all_, options, start);
     for (int t = 0; t < islands_.count() && options.method != LcpMethod::pgs; ++t) solve_island(t, options, start);
     return finish(islands_.whole(), options);
   }
@@ -243,6 +246,7 @@ class LcpSolver {
   lcp::ActiveSet exact_;
   lcp::DefiniteProof definite_;
   std::vector<lcp::DefiniteMargin> margins_;  ///< of the islands
+  lcp::DefiniteMargin margin_of_all_;         ///< of the matrix that is not split
   Eigen::MatrixXd dense_values_;
 };
 

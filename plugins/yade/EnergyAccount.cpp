@@ -338,8 +338,9 @@ void EnergyAccount::tally(const Scene& after) {
 		const auto* const motion = dynamic_cast<const WallMotion*>(engine.get());
 		if (!motion || motion->lastStep != recorded) continue;
 		driven.resize(bodies.size(), nullptr);
-		for (std::size_t k = 0; k < motion->ids.size(); ++k)
-			if (std::size_t(motion->ids[k]) < driven.size()) driven[std::size_t(motion->ids[k])] = &motion->after(k);
+		motion->eachAfter([&](int id, const ::dembark::SixVector& velocity) {
+			if (std::size_t(id) < driven.size()) driven[std::size_t(id)] = &velocity;
+		});
 	}
 	for (std::size_t k = 0; k < bodies.size(); ++k) {
 		if (!present[k]) continue;

@@ -19,8 +19,10 @@ using dembark_yade::vec;
 
 boost::python::list FacetSurface::readStl(const std::string& path, Real precision) {
 	try {
-		boost::python::list found;
-		for (const ::dembark::Triangle& t : ::dembark::read_stl(path, precision).triangles) {
+		boost::python::list         found;
+		const ::dembark::StlSurface read = ::dembark::read_stl(path, precision);
+		if (const std::string line = read.left_out(path); !line.empty()) dembark_yade::warn(line);
+		for (const ::dembark::Triangle& t : read.triangles) {
 			boost::python::list corners;
 			for (const auto& n : t.node) corners.append(Vector3r(n.x, n.y, n.z));
 			found.append(corners);

@@ -224,8 +224,9 @@ void IntegrationMonitor::takeContacts() {
 
 /// If the contact began in this step.
 void IntegrationMonitor::beginImpact(const Interaction& interaction, const FinnieRabinowiczPhys& phys) {
-	const Body::id_t id1 = interaction.getId1(), id2 = interaction.getId2();
-	const Body &     body1 = *Body::byId(id1, scene), &body2 = *Body::byId(id2, scene);
+	// The lower one first, as picked() and ShadowImpact want them.
+	const auto [id1, id2] = std::minmax({interaction.getId1(), interaction.getId2()});
+	const Body &body1 = *Body::byId(id1, scene), &body2 = *Body::byId(id2, scene);
 	if (body1.state->blockedDOFs || body2.state->blockedDOFs || !::dembark::picked(id1, id2, scene->iter, impacts)) return;
 	ShadowImpact shadow;
 	if (shadow.begin(phys.contact, pairOf(body1, body2), id1, id2, scene->dt)) run.shadows.add({shadow});

@@ -143,6 +143,8 @@ void SphFluid::action() {
 	const bool      again = scene->iter == lastIteration;
 	sph::Solver&    own   = fluid();
 	if (now != gravity) fail("SphFluid: NewtonIntegrator.gravity has changed since the fluid began; that is not possible");
+	if (const char* const changed = settings().difference(own.scene().settings))
+		fail(inYade(changed) + " has changed since the fluid began; that is not possible");
 	try {
 		if (passed < 0) {
 			motions.clear();

@@ -85,6 +85,7 @@ void WallMotion::begin() {
 	begunMotion = motion;
 	begunIds    = ids;
 	lastStep    = -1;
+	next.clear();
 	places.clear();
 	take();
 }

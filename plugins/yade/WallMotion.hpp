@@ -22,9 +22,13 @@ public:
 	void start();
 	/// Takes up the motion and the forces of the present step, once.
 	void measure();
-	/// Velocity of a body (by its place in ids) in the half step after `lastStep`, with the wall where it was in that step: what mean
-	/// velocities are made with. A body that turns has another one when it has come to its next place.
-	const ::dembark::SixVector& after(std::size_t k) const { return next[k]; }
+	/// Calls visit(id, velocity) for the bodies that `lastStep` moved, whatever `ids` is now. The velocity is that of the half step
+	/// after it, with the wall where it was in that step: what mean velocities are made with. A body that turns has another one when it
+	/// has come to its next place.
+	template <class Visit>
+	void eachAfter(const Visit& visit) const {
+		for (std::size_t k = 0; k < next.size(); ++k) visit(begunIds[k], next[k]);
+	}
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(WallMotion,GlobalEngine,"Moves held bodies (facets, boxes, walls, spheres) together by a prescribed motion: a sum of terms whose place, velocity and acceleration are known at any time, and which no force changes. Stands after :yref:`InteractionLoop` and :yref:`EnergyAccount`, and before :yref:`NewtonIntegrator`. Contact laws see [x(n) - x(n-1)] / dt, the velocity of the half step of which the grains' velocities are. Attributes hold the motion and what the bodies do to the others at the step that measure() or the last step took.",
 		((std::vector<int>,ids,,,"Bodies that move"))

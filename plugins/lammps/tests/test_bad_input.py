@@ -62,7 +62,7 @@ def test_the_deck_runs_as_it_is(tmp_path, deck):
     ("type 2", "kind 2", ("'wall/dembark region ID type T'",)),
     ("region floor type", "region flour type", ("no region flour",)),
     ("neighbor 0.001 bin", "neighbor 0.0001 bin\ncreate_atoms 1 single 0 0 0.01495\nset atom 2 diameter 0.01 density 2500",
-     ("a bridge reaches", "neighbor skin is 0.0001 m", "use neighbor")),
+     ("a bridge reaches", "neighbor skin is 0.0001", "use neighbor")),
 ])
 def test_one_line_says_what_is_wrong(tmp_path, deck, old, new, words):
     assert old in deck

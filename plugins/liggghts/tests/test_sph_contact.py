@@ -156,10 +156,29 @@ def test_resumes_to_the_bit_with_films(tmp_path: Path) -> None:
 
 def test_a_state_of_other_boxes_is_refused(tmp_path: Path) -> None:
     assert run_deck(tmp_path, deck(run="run 450")).code == 0
-    done = run_deck(tmp_path, deck(begin=GROUPS, run="run 500 upto", old="plane 0 0 0 0 0 1 0.4 0.6",
-                                   new="plane 0 0 0 0 0 1 0.4 0.6 plane 0 0 0 1 0 0 0.4 0.6"), name="second.in")
-    assert done.code != 0
-    assert "the state has contacts of box one box two and 1 planes, not of box one box two and 2 planes" in done.error, done.error
+    plane = "plane 0 0 0 0 0 1 0.4 0.6"
+    for old, new, named in ((plane, f"{plane} plane 0 0 0 1 0 0 0.4 0.6", "plane 0 0 0 1 0 0"),
+                            (plane, "plane 0 0 0.01 0 0 1 0.4 0.6", "plane 0 0 0.01"),
+                            ("box two 0.06 0.06 0.06", "box two 0.06 0.06 0.05", "box two 0.06 0.06 0.05")):
+        done = run_deck(tmp_path, deck(begin=GROUPS, run="run 500 upto", old=old, new=new), name="second.in")
+        assert done.code != 0
+        before = "rounding 0.004 box one 0.06 0.06 0.06 box two 0.06 0.06 0.06 plane 0 0 0 0 0 1"
+        assert f"the state has contacts of '{before}', not of" in done.error
+        assert named in done.error, done.error
+
+
+def test_a_body_goes_on_with_the_properties_of_the_script(tmp_path: Path) -> None:
+    """With twice the mass a body of a restart file moves otherwise from there on."""
+    body, again = "fix two two sph/body mass 0.2", GROUPS.replace("resume_state state", "read_restart here.restart")
+    state = "fix state all resume/exact 400 state"
+    assert run_deck(tmp_path, deck(run="run 450\nwrite_restart here.restart", old=state)).code == 0
+    ends = []
+    for number, mass in enumerate((0.2, 0.4)):
+        text = deck(begin=again, run="run 200", rows=f"rows{number}", old=state).replace(body, f"fix two two sph/body mass {mass}")
+        done = run_deck(tmp_path, text, name="second.in")
+        assert done.code == 0, done.error or done.output[-1500:]
+        ends.append(table(tmp_path, f"rows{number}")[-1][2])
+    assert abs(ends[1] - ends[0]) > 1e-5
 
 
 def test_boxes_that_are_too_soft_end_the_run(tmp_path: Path) -> None:

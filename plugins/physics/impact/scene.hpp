@@ -115,6 +115,7 @@ class Scene {
       contacts.push_back({int(i), int(i + 1), a.id, b.id, b.position.x - a.position.x - a.radius - b.radius, Vec3<double>{-1.0, 0.0, 0.0}});
     }
     for (const Plane& p : around.planes) {
+      if (bodies_.empty()) break;
       const std::size_t end = p.normal.x > 0.0 ? 0 : bodies_.size() - 1;
       const double gap = (bodies_[end].position.x - p.point.x) * p.normal.x - bodies_[end].radius;
       detail::wall_contact(p, int(end), bodies_[end], p.id, gap, p.normal, p.velocity, contacts);

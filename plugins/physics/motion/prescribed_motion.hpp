@@ -107,6 +107,10 @@ class PrescribedMotion {
   }
   /// The one clear line about a time step (s) that is too long for the motion, or nothing.
   std::string step_error(double h) const {
+    for (const auto& table : tables_)
+      if (table.finest() < h * (1.0 - 1e-9))
+        return "its table has rows " + number_text(table.finest()) + " s apart, closer than the time step of " + number_text(h) +
+               " s: take a shorter step, or fewer rows";
     if (!(shortest_period() < 10.0 * h)) return "";
     return "its shortest period, " + number_text(shortest_period()) + " s, is below ten time steps of " + number_text(h) +
            " s: take a shorter step";
@@ -118,6 +122,10 @@ class PrescribedMotion {
     rest.oscillations_.clear();
     WallReach all(rest.at(from));
     for (int k = 1; k <= samples; ++k) all.take(rest.at(from + (to - from) * k / samples));
+    // Rows may be closer than samples.
+    for (const auto& table : tables_)
+      for (const auto& row : table.rows())
+        if (const double t = table.window.start + row.time; t > from && t < to) all.take(rest.at(t));
     for (const auto& term : oscillations_) {
       // Without a ramp it begins within the oscillation, whose middle is elsewhere.
       const double sine = term.ramp > 0.0 ? 0.0 : std::sin(term.phase), cosine = term.ramp > 0.0 ? 0.0 : std::cos(term.phase);

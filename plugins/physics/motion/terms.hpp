@@ -204,6 +204,13 @@ class Table {
     for (std::size_t k = n - 1; k-- > 1;) slopes_[k] -= upper[k] * slopes_[k + 1];
   }
 
+  const std::vector<TableRow>& rows() const { return rows_; }
+  /// s: the least time between two rows.
+  double finest() const {
+    double least = never;
+    for (std::size_t k = 1; k < rows_.size(); ++k) least = std::min(least, rows_[k].time - rows_[k - 1].time);
+    return least;
+  }
   void add(double time, WallState& to) const {
     if (rows_.empty()) return;
     const double t = time - window.start;

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <string>
+#include <tuple>
 
 #include "contact_potential.hpp"
 #include "kernels.hpp"
@@ -46,6 +49,30 @@ struct Settings {
            std::to_string(1e3 * dt) + " ms";
   }
 
+  /// Name of a setting that has another value in `other`, or nullptr. Without gravity, which engines keep.
+  const char* difference(const Settings& other) const {
+    static constexpr const char* names[] = {
+        "dimension", "spacing", "smoothing", "density",           "sound_speed",      "gamma", "tension", "alpha",        "delta", "kernel",
+        "boundary",  "no_slip", "shifting",  "contact_stiffness", "contact_exponent", "skin",  "threads", "slit_pressure"};
+    const auto values = [](const Settings& s) {
+      return std::tie(s.dimension, s.spacing, s.smoothing, s.state.density, s.state.sound_speed, s.state.gamma, s.state.tension, s.alpha,
+                      s.delta, s.kernel, s.boundary, s.no_slip, s.shifting.coefficient, s.contact.stiffness, s.contact.exponent, s.skin,
+                      s.threads, s.slit_pressure);
+    };
+    static_assert(std::tuple_size_v<decltype(values(other))> == std::size(names));
+    return std::apply(
+        [&](const auto&... mine) {
+          return std::apply(
+              [&](const auto&... others) {
+                const char* found = nullptr;
+                std::size_t k = 0;
+                ((found = !found && mine != others ? names[k] : found, ++k), ...);
+                return found;
+              },
+              values(other));
+        },
+        values(*this));
+  }
   /// The one clear line about what is wrong with these settings, or nullptr.
   const char* error() const {
     if (dimension != 2 && dimension != 3) return "dimension must be 2 or 3";

@@ -97,6 +97,14 @@ TEST_CASE("the unequal pair: published numbers") {
   CHECK_THAT(scene.velocity()[1].x, WithinAbs(0.5995, 5e-5));
 }
 
+TEST_CASE("a row without logs touches no plane") {
+  Scene scene(settings(1e-6, 1.0, {2e7}), {});
+  scene.row = true;
+  scene.around.planes.push_back({});
+  scene.run(2);
+  CHECK(scene.velocity().empty());
+}
+
 TEST_CASE("five logs in a row, and their momentum") {
   std::vector<Body> logs;
   for (int i = 0; i < 5; ++i) logs.push_back(body(i, 50, 0.1 * i, i == 0 ? 1.0 : 0.0));

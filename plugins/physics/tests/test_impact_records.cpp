@@ -120,6 +120,25 @@ TEST_CASE("the forces of the last step hold for the bodies that it left, and for
   CHECK_THROWS_WITH(few(again), Catch::Contains("too few"));
 }
 
+TEST_CASE("state as numbers: integers are whole and in range") {
+  enum class Kind : unsigned char { one, two };
+  const auto read = [](double number, auto value) {
+    from_numbers({number}, value);
+    return value;
+  };
+  CHECK(read(7.0, 0) == 7);
+  CHECK(read(-1.0, 0L) == -1L);
+  CHECK(read(1.0, Kind::one) == Kind::two);
+  CHECK(read(0.5, 0.0) == 0.5);
+  for (const double wrong : {0.5, 1e10, -1e10, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    CHECK_THROWS_WITH(read(wrong, 0), Catch::Contains("an integer is due"));
+    CHECK_THROWS_WITH(read(wrong, Kind::one), Catch::Contains("an integer is due"));
+  }
+  // The largest of 64 bits is no double: 2^63, its nearest, is beyond.
+  CHECK_THROWS_WITH(read(std::ldexp(1.0, 63), std::int64_t{0}), Catch::Contains("an integer is due"));
+  CHECK_THROWS_WITH(read(2.0, false), Catch::Contains("an integer is due"));
+}
+
 TEST_CASE("the file of impacts: begun, gone on with, gone") {
   const std::string path = (std::filesystem::temp_directory_path() / "dembark-test-impacts.txt").string();
   const auto text = [&] {

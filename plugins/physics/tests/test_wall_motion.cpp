@@ -115,6 +115,13 @@ TEST_CASE("wall motion: a table is met in its rows, smooth between them, at rest
   }
   for (double t = 0.503; t < 0.85; t += 0.01)
     CHECK_THAT(difference(motion.at(t - h), motion.at(t + h), motion.at(t), 2.0 * h), WithinAbs(0.0, 1e-7));
+  // Rows that no sample meets, and rows within one step.
+  write("0 0 0 0\n4.99999 0 0 0\n5.00001 0 0 0.7\n5.00003 0 0 0\n10 0 0 0\n");
+  PrescribedMotion jump{"table file " + name + " start 0"};
+  jump.begin(0.0);
+  CHECK(jump.reach(0.0, 9.0).high.z >= 0.7);
+  CHECK(jump.step_error(1.9e-5).empty());
+  CHECK(jump.step_error(1e-4).find("its table has rows 2e-05 s apart, closer than the time step of 0.0001 s") == 0);
   write("0 0 0 0\n0.2 0 0 1\n0.2 0 0 2\n");
   CHECK(message("table file " + name) == "motion table: file '" + name + "', line 3: the times do not ascend");
   write("0 0 0\n");

@@ -219,6 +219,11 @@ def messages():
     said["twice"] = refusal(lambda: fluid.addBody(body, [(0.1, 0.15, 0)]))
     advance(1)
     said["late"] = refusal(lambda: fluid.addWall([(0, 0, 0)]))
+    for name, value in (("alpha", 0.5), ("soundSpeed", 2 * fluid.soundSpeed), ("kernel", "cubic_spline")):
+        before = getattr(fluid, name)
+        setattr(fluid, name, value)
+        said[f"changed {name}"] = refusal(lambda: go(1))
+        setattr(fluid, name, before)
     O.engines[-1].gravity = Vector3(0, -1, 0)
     said["gravity"] = refusal(lambda: go(1))
     empty = begin((0, 0, 0))

@@ -138,6 +138,17 @@ def pushed():
     return found
 
 
+def other_ids():
+    """Energies of a step after which the list of bodies that move is as it was, in another order, or longer."""
+    found = []
+    for change in (lambda ids: ids, lambda ids: ids[::-1], lambda ids: [*ids, *range(100, 200)], lambda ids: ids[:1]):
+        books, moves, _ = scene(ROCK)
+        advance(200)
+        moves.ids = change(list(moves.ids))
+        found.append(books.energies())
+    return found
+
+
 def bounce():
     """Times at which a grain lands on a shaken plate."""
     step, radius = vessel.BOUNCE_STEP, vessel.RADIUS

@@ -16,7 +16,7 @@ def found(yade):
     done = yade(HERE / "surface_scenes.py", str(out), "flat", "bends", "corner", "moving", "periodic", "changes", "messages",
                 "files", "refused", "entering")
     assert "scenes: finished" in done.stdout, (done.stdout + done.stderr)[-3000:]
-    return json.loads(out.read_text())
+    return json.loads(out.read_text()) | {"stderr": done.stderr}
 
 
 def rows(run):
@@ -95,6 +95,12 @@ def test_every_file_of_a_floor_is_the_floor(found):
         assert np.abs(force - plane).max() < 2e-3 * plane.max(), name
         if "um" not in name:
             assert np.abs(force - plane).max() < 3e-5 * plane.max(), name
+
+
+def test_what_a_file_has_twice_is_named(found):
+    line = "WARNING: dembark: file 'floor.stl': left out"
+    assert f"{line} 2 triangles without area and 0 given again" in found["stderr"]
+    assert f"{line} 0 triangles without area and 8 given again" in found["stderr"]
 
 
 def test_other_files_are_refused_in_one_line(found):

@@ -119,7 +119,9 @@ def test_frames_and_rows_can_be_read(found, tmp_path):
     ("torn", "SphFluid: a pressure must be > -"),
     ("stranger", "body 2 is not in the fluid"), ("twice", "body 2 is in the fluid already"), ("late", "the fluid has begun"),
     ("overlap", "m overlaps others: there are 1.92 times as many as in the lattice; leave out fluid where walls and bodies are"),
-    ("gravity", "NewtonIntegrator.gravity has changed"), ("no fluid", "there is no fluid"), ("blows up", "the fluid blew up at t =")])
+    ("changed alpha", "SphFluid: alpha has changed since the fluid began"), ("changed soundSpeed", "SphFluid: soundSpeed has changed"),
+    ("changed kernel", "SphFluid: kernel has changed"), ("gravity", "NewtonIntegrator.gravity has changed"),
+    ("no fluid", "there is no fluid"), ("blows up", "the fluid blew up at t =")])
 def test_wrong_input_is_told_in_one_line(found, name, line):
     said = found["messages"][name]
     assert said.startswith("dembark: ") and line in said and "\n" not in said

@@ -17,7 +17,7 @@ from dembark.physics import WallMotion
 
 @pytest.fixture(scope="module")
 def found(yade):
-    return yade.scenes("place", "velocity", "frames", "shaken", "pushed", "bounce", "reloaded", "messages", "late", "again",
+    return yade.scenes("place", "velocity", "frames", "shaken", "pushed", "other_ids", "bounce", "reloaded", "messages", "late", "again",
                        script="motion_scenes.py")
 
 
@@ -87,6 +87,11 @@ def test_energies_balance_and_the_work_of_the_wall_is_of_second_order(found, mot
 def test_spring_work_of_a_pushed_grain_is_of_second_order(found):
     coarse, fine = found["pushed"]
     assert 3.0 < coarse / fine < 5.5
+
+
+def test_energies_are_those_of_the_bodies_that_moved(found):
+    first, *others = found["other_ids"]
+    assert first["kinetic"] > 0.0 and all(other == first for other in others)
 
 
 def test_grain_on_a_shaken_plate_lands_when_it_must(found):
