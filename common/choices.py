@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 from .errors import DembarkError
 
@@ -15,6 +16,13 @@ def nearest(name: str, known: Iterable[str]) -> str:
     names = sorted(known)
     close = difflib.get_close_matches(name, names, n=3, cutoff=0.55)
     return f"did you mean {' or '.join(close)}?" if close else f"known are {', '.join(names) or 'none'}"
+
+
+class Known(dict[str, Any]):
+    """A dictionary of parameters whose KeyError names near matches."""
+
+    def __missing__(self, name: str) -> Any:
+        raise KeyError(f"there is no parameter {name}, {nearest(name, self)}")
 
 
 def pick(name: str, known: Iterable[str], what: str, where: str) -> str:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.common.choices import Known
 from dembark.common.parallel import cores_here
 
 from . import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
@@ -31,8 +32,8 @@ class Replica:
 
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """Resolved parameters in SI units."""
-        return self.record["parameters"]
+        """Resolved parameters in SI units; KeyError with near matches for another name."""
+        return Known(self.record["parameters"])
 
     @property
     def derived(self) -> Mapping[str, Any]:

@@ -17,6 +17,7 @@ from MDAnalysis.topology.base import TopologyReaderBase
 from numpy.typing import NDArray
 
 from .dumps.frames import Array, DumpError, cell
+from .dumps.series import files_of
 from .grains import GrainFrame, GrainsDump
 
 _KEPT = ("columns", "density", "skip_truncated", "units", "varying")
@@ -45,9 +46,10 @@ def _opened(filename: str, _stamp: object, options: tuple[tuple[str, Any], ...])
 
 
 def _grains(filename: str | Path, options: dict[str, Any]) -> _Grains:
-    stat = Path(filename).stat() if Path(filename).is_file() else None
+    files = files_of(filename)
+    stats = [file.stat() for file in ([files] if isinstance(files, Path) else files) if file.is_file()]
     kept = tuple((name, tuple(value) if isinstance(value := options[name], list) else value) for name in _KEPT if name in options)
-    return _opened(str(filename), stat and (stat.st_size, stat.st_mtime_ns), kept)
+    return _opened(str(filename), tuple((stat.st_size, stat.st_mtime_ns) for stat in stats), kept)
 
 
 def _roster(dump: GrainsDump, first: GrainFrame, varying: bool | None) -> dict[str, NDArray[Any]]:

@@ -14,6 +14,8 @@ from dembark.common.errors import DembarkError
 Array = NDArray[np.float64]
 # Multiplication by a prime modulo the number of sites is a permutation.
 _PRIME = 15485863
+_OTHER_PRIMES = (32452843, 49979687, 67867967)
+_TREND = 0.3  # largest correlation of a permutation with its index
 # Sites of a lattice, and bodies of a packing: about 1 GB while it is made.
 MOST_SITES = 1e7
 
@@ -134,5 +136,11 @@ def slab(p: Parameters, width: float, depth: float, margin: float, foot: float, 
 
 
 def rank(count: int, seed: int) -> NDArray[np.int64]:
-    """A permutation of 0 ... count - 1 by the seed."""
-    return ((np.arange(1, count + 1) + seed) * _PRIME) % count
+    """A permutation of 0 ... count - 1 by the seed, which does not rise or fall with its index."""
+    numbers = np.arange(count)
+    found = [((numbers + 1 + seed) * prime) % count for prime in (_PRIME, *_OTHER_PRIMES)]
+    if count < 3:
+        return found[0]
+    # For one count in a hundred a prime is close to a multiple of it, and the permutation is almost the order that it is to destroy.
+    trends = [abs(float(np.corrcoef(numbers, each)[0, 1])) for each in found]
+    return found[0] if trends[0] < _TREND else found[int(np.argmin(trends))]

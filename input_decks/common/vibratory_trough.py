@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replica, Value, block_mean, exact, profile
 from dembark.postproc.replica import cached_per_replica
@@ -183,14 +184,16 @@ def read(replica: Replica) -> Trough:
 
 
 def numerical_changes(points: Points, quantities: Sequence[str]) -> Measurement:
-    """How far steady `quantities` depend on the numerics: the largest less the smallest value over the size of the mean, with the
-    half-width that the intervals of both ends give it."""
+    """How far steady `quantities` depend on the numerics: the largest less the smallest value over the size of the mean. Any two of
+    the n points could have been the ends, so its half-width holds for all n (n - 1) / 2 differences together (Bonferroni)."""
     values = {}
+    pairs = max(1, len(points) * (len(points) - 1) // 2)
+    wider = float(norm.ppf(1.0 - 0.025 / pairs) / norm.ppf(0.975))
     for quantity in quantities:
         found = [measured(point, quantity) for point in points]
         low, high = (pick(found, key=lambda one: one.value) for pick in (min, max))
         size = abs(float(np.mean([one.value for one in found])))
-        change = Estimate((high.value - low.value) / size, combined([low.half, high.half]) / size, "propagated from the points")
+        change = Estimate((high.value - low.value) / size, wider * combined([low.half, high.half]) / size, "propagated from the points")
         values[f"{quantity}_change"] = Value(change, exact(0.0))
     return Measurement(values)
 

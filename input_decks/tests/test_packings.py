@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
+from dembark.input_decks.common.packing import rank
 from dembark.validation.case.deck import prepare
 from dembark.validation.case.folders import discover, load
 from dembark.validation.case.model import Case
@@ -22,6 +26,16 @@ FEWER = {
     "dam_break_cubes": "its single runs have nothing random; those that have, stacks in both engines, are five",
     "vibrated_layer": "waves forget the packing within tens of periods: intervals come from windows of time",
 }
+
+
+@given(count=st.integers(1, 3000), seed=st.integers(1, 10000))
+@example(count=328, seed=1)
+@example(count=1271, seed=7)
+def test_an_order_by_the_seed_has_no_trend(count: int, seed: int) -> None:
+    order = rank(count, seed)
+    assert sorted(order) == list(range(count))
+    if count > 40:
+        assert abs(np.corrcoef(np.arange(count), order)[0, 1]) < 0.3
 
 
 def too_few(case: Case, least: int = LEAST) -> list[tuple[str, str, str]]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.common.vibration import PHASES
-from dembark.input_decks.common.vibratory_trough import circulation, drifts, spectra, spectrum
+from dembark.input_decks.common.vibratory_trough import circulation, drifts, numerical_changes, spectra, spectrum
 from dembark.input_decks.tests.synthetic_bed import PERIOD, D, trough
 
 
@@ -64,3 +64,15 @@ def test_the_spectrum_sums_up_to_the_variance(count: int) -> None:
     forces = np.random.default_rng(2).standard_normal((count, 3))
     _, power = spectrum(forces, 10)
     assert power.sum() == pytest.approx(forces.var(axis=0).sum())
+
+
+@pytest.mark.parametrize("count", [2, 4, 6])
+def test_the_largest_change_of_points_that_are_the_same_is_none(count: int) -> None:
+    """Of the two that are furthest apart the interval of one difference would miss zero in up to a third of all cases."""
+    random, missed = np.random.default_rng(count), 0
+    for _ in range(1000):
+        points = [{"quantities": [{"name": "spin", "value": value, "interval": [value - 0.0196, value + 0.0196]}]}
+                  for value in random.normal(1.0, 0.01, count)]
+        found = numerical_changes(points, ["spin"]).values["spin_change"].estimate
+        missed += found.value > found.half
+    assert 0.01 < missed / 1000 < 0.07

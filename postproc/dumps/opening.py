@@ -30,7 +30,7 @@ def open_dump(path: Trajectory, skip_truncated: bool = False, *, stream: bool = 
     options: dict[str, Any] = {"skip_truncated": skip_truncated, "stream": stream, "units": units}
     if isinstance(files, Path):
         return _open_one(files, columns=columns, **options)
-    return SeriesDump(files, partial(_open_one, columns=columns, stream=True), **options)
+    return SeriesDump(path, partial(_open_one, columns=columns, stream=True), **options)
 
 
 def _open_one(file: Path, *, columns: Sequence[str] | None, **options: Any) -> Dump:

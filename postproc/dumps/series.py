@@ -38,19 +38,26 @@ def _fault(one: Dump, entry: Entry) -> str:
 
 
 class SeriesDump(Dump):
-    """The frames of several files as one trajectory; see Dump. `open_one` opens a file without making its index."""
+    """The frames of several files as one trajectory; see Dump. `path` is a pattern or a list, as files_of() takes it; `open_one` opens a
+    file without making its index."""
 
-    def __init__(self, files: Sequence[Path], open_one: Callable[[Path], Dump], *, skip_truncated: bool = False, stream: bool = False,
-                 units: str = "") -> None:
+    def __init__(self, path: str | Path | Sequence[str | Path], open_one: Callable[[Path], Dump], *, skip_truncated: bool = False,
+                 stream: bool = False, units: str = "") -> None:
         """Open; DumpError for a missing, foreign or truncated file."""
-        self._files, self._open_one = files, open_one
-        super().__init__(files[0], skip_truncated=skip_truncated, stream=stream, units=units)
+        self._pattern, self._open_one = path, open_one
+        self._files = self._look()
+        super().__init__(self._files[0], skip_truncated=skip_truncated, stream=stream, units=units)
+
+    def _look(self) -> list[Path]:
+        found = files_of(self._pattern)
+        return [found] if isinstance(found, Path) else found
 
     def _where(self, entry: Entry) -> str:
         return f"{self._files[entry.file]}, frame {entry.number}"
 
     def _find(self) -> Iterator[Entry]:
         files: dict[tuple[int, ...], Path] = {}
+        self._files = self._look()  # a run may have written more of them
         for number, path in enumerate(self._files):
             try:
                 one, steps = self._open_one(path), []

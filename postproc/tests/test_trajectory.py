@@ -72,6 +72,22 @@ def test_grains_that_are_replaced_in_equal_number(tmp_path):
     np.testing.assert_allclose(world.atoms.positions[[0, 1, 3]], PLACES, atol=1e-6)
 
 
+def test_a_series_that_grows(tmp_path):
+    """A pattern is looked at anew: by refresh(), and by another universe."""
+    pattern = tmp_path / "dump*.grains"
+
+    def write(step):
+        (tmp_path / f"dump{step}.grains").write_text(grains_text(step, PLACES, RADII))
+
+    write(0)
+    write(10)
+    dump, first = GrainsDump(pattern), universe(pattern)
+    write(20)
+    dump.refresh()
+    assert len(dump) == 3 and dump[2].step == 20
+    assert first.trajectory.n_frames == 2 and universe(pattern).trajectory.n_frames == 3
+
+
 def test_columns_that_are_not_there(tmp_path):
     path = tmp_path / "grains.dump"
     head = "ITEM: TIMESTEP\n5\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\nITEM: ATOMS "
