@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import os
 import sys
 from collections.abc import Callable
@@ -110,8 +109,7 @@ def run(
     console.print(show.quantity_table(result, console.width))
     for line in show.open_lines(result):
         console.print(line, markup=False, soft_wrap=True)
-    measured = [quantity.name for quantity in result.quantities]
-    if gone := [name for name, check in one.quantities.items() if check.tolerance is not None and not fnmatch.filter(measured, name)]:
+    if gone := one.unmeasured(quantity.name for quantity in result.quantities):
         console.print(f"declared, not measured in this run: {', '.join(gone)}", markup=False, soft_wrap=True)
     counted = tally(result.quantities)
     show.print_tally(console, counted)

@@ -13,12 +13,12 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 import numpy as np
 
-from dembark.common.choices import Value
+from dembark.common.choices import Value, nearest
 from dembark.common.errors import DembarkError
 from dembark.common.extras import advice
 from dembark.validation import engines
@@ -61,6 +61,13 @@ def failed(path: Path, error: Exception) -> DembarkError:
     return DembarkError(f"{path}{f', line {line}' if line else ''}", *(advice(error) or [f"{type(error).__name__}: {error}"]))
 
 
+class _Known(SimpleNamespace):
+    """Parameters and derived numbers, as setup.py gets them."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(f"there is no parameter {name}, {nearest(name, vars(self))}")
+
+
 @cache
 def _setup_module(path: Path) -> ModuleType:
     return load_module(path, f"dembark_setup_{path.parent.name}")
@@ -81,7 +88,7 @@ def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
         return Setup(round(float(known["steps"])), float(known["time_step"]), None,  # type: ignore[arg-type]
                      {name: known[name] for name in case.derived})  # type: ignore[misc]
     try:
-        return _setup_module(path).setup(SimpleNamespace(**known))
+        return _setup_module(path).setup(_Known(**known))
     except DembarkError:
         raise
     except MemoryError as error:
@@ -125,7 +132,7 @@ def require_measure(case: Case) -> None:
         raise DembarkError(f"case {case.name} has no measure.py", str(case.folder),
                            "add one with measure(replicas), see docs/how-to/cases.md")
     for path, line, name, table in imports.named_tables(code):
-        named = f"{path}, line {line}, names it"
+        named = f"read by {path}, line {line}"
         if table is None:
             raise DembarkError(f"case {case.name} has no file {name}", named, f"put it into {case.folder / 'reference'}")
         if fault := _fault(table):
@@ -250,12 +257,45 @@ def _files(case: Case, engine: str, values: Mapping[str, Value], setup: Setup) -
     try:
         deck = kind.deck_text(text, numbers, _folders(case, engine))
     except jinja2.TemplateError as error:
-        line = f", line {error.lineno}" if isinstance(error, jinja2.TemplateSyntaxError) else ""
-        raise DembarkError(f"{source}{line}", str(error)) from None
+        raise _wrong_template(case, engine, source, set(numbers), error) from None
+    if unknown := _unknown_variables(deck):
+        raise DembarkError(f"{source} uses ${{{unknown[0]}}}, which nothing defines", nearest(unknown[0], _DEFINED.findall(deck)),
+                           "make it a parameter, or one of the numbers of setup.py")
     files = {kind.facts.deck: deck.encode()}
     if setup.packing is not None:
         files[PACKING] = setup.packing.text().encode()
     return files | {f"{name}.stl": stl(name, triangles) for name, triangles in setup.meshes.items()}
+
+
+# By dembark's command line: the steps between states.
+_GIVEN = {"restart_every"}
+_DEFINED = re.compile(r"^\s*variable\s+(\w+)\s", re.MULTILINE)
+# Names that a template sets, or takes where they are set.
+_NAMED = re.compile(r"{%-?\s*set\s+([\w, ]+?)\s*=|\b(\w+)\s*\|\s*default")
+
+
+def _unknown_variables(deck: str) -> list[str]:
+    """Names of `${name}` in a list of commands that no `variable` there defines; none when the engine reads more files."""
+    if re.search(r"^\s*(include|jump)\s", deck, re.MULTILINE):
+        return []
+    code = "\n".join(line.partition("#")[0] for line in deck.splitlines())
+    known = {*_DEFINED.findall(code), *_GIVEN}
+    return [name for name in re.findall(r"\$\{(\w+)\}", code) if name not in known]
+
+
+def _wrong_template(case: Case, engine: str, source: Path, known: set[str], error: jinja2.TemplateError) -> DembarkError:
+    """One line about an error in a deck or in a part that it includes: which file, line, and a name that may have been meant."""
+    frames = [(frame.filename, frame.lineno) for frame in traceback.extract_tb(error.__traceback__)
+              if frame.filename == "<template>" or frame.filename.endswith(".in")]
+    if isinstance(error, jinja2.TemplateSyntaxError):
+        frames = [(error.filename or "<template>", error.lineno)]
+    file, line = frames[-1] if frames else ("<template>", None)
+    place = f"{source if file == '<template>' else file}{f', line {line}' if line else ''}"
+    if undefined := re.fullmatch(r"'(\w+)' is undefined", str(error)):
+        names = known.union(*(re.findall(r"\w+", part) for text in included_sources(case, engine).values()
+                              for found in _NAMED.findall(text) for part in found))
+        return DembarkError(place, str(error), nearest(undefined.group(1), names))
+    return DembarkError(place, str(error))
 
 
 def _meaning(case: Case, name: str) -> str:

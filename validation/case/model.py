@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -229,6 +229,11 @@ class Case:
             if star and name.startswith(before) and name.endswith(after) and len(name) > len(before) + len(after):
                 return one, name[len(before) : len(name) - len(after)]
         return None
+
+    def unmeasured(self, names: Iterable[str]) -> list[str]:
+        """Names of the declared checks that are none of the measured quantities `names`."""
+        found = {known[0].name for name in names if (known := self.declared(name))}
+        return [name for name, one in self.quantities.items() if one.tolerance is not None and name not in found]
 
     def cause(self, name: str, declared: str, variant: str) -> str:
         """The known cause of a failure of the quantity `name`, declared under `declared`, in `variant`; "" when none is known."""

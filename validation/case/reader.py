@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from dembark.common.choices import Value
+from dembark.common.choices import Value, nearest
 from dembark.common.errors import DembarkError
 from dembark.common.units import known_unit, si_unit
 from dembark.validation import engines
@@ -66,7 +66,8 @@ class CaseReader(TableReader):
         self.table(head, "case", _CASE, ("title",))
         self.texts(head, "case", [key for key, kind in _CASE.items() if kind is list])
         groups = [_groups()[self.pick(name, _groups(), "group", "case")] for name in head.get("groups", ())]
-        parameters = {name: self.parameter(name, entry) for name, entry in self.merged("parameters", data, groups).items()}
+        given = {name for group in groups for name in group.get("parameters", {})}
+        parameters = {name: self.parameter(name, entry, given) for name, entry in self.merged("parameters", data, groups).items()}
         derived = self.derived(data.get("derived", {}), parameters)
         quantities = self.merged("quantities", data, groups)
         controls = self.controls([*groups, data], quantities)
@@ -126,11 +127,13 @@ class CaseReader(TableReader):
             result[name] = {**result.get(name, {}), **entry}
         return result
 
-    def parameter(self, name: str, entry: Mapping[str, Any]) -> Parameter:
-        """[parameters.NAME], its own value checked."""
+    def parameter(self, name: str, entry: Mapping[str, Any], of_groups: Collection[str] = ()) -> Parameter:
+        """[parameters.NAME], its own value checked. `of_groups`: names that need no `doc`, of which it may be a misspelt one."""
         table = f"parameters.{name}"
         if not name.isidentifier():
             raise self.fail(table, f"{name!r} is not a name of a parameter", "letters, digits and underscores")
+        if "doc" not in entry and (near := nearest(name, of_groups)).startswith("did you mean"):
+            raise self.fail(table, f"no group has a parameter {name}, and doc is missing", near)
         found = self.record(Parameter, entry, table, name=name)
         if found.value is None and not found.optional:
             raise self.fail(table, "value is missing", "a value, or optional = true")

@@ -23,7 +23,7 @@ def decides(deviation: float, own: float, reference: float, tolerance: float, ba
     count, excess = packings(basis), abs(deviation) - tolerance
     target = -excess if excess < 0.0 else max(tolerance, excess)
     if reference >= target:
-        return f"a reference known to ±{target:.2g}, now ±{reference:.2g}"
+        return f"a reference known to {_limits(target, reference)}"
     wanted = math.sqrt(target**2 - reference**2)
     enough, longer = f"{PACKINGS} packings or more", f"runs about {max((own / wanted) ** 2, 1.1):.2g} times as long"
     if count < PACKINGS or not math.isfinite(own):
@@ -31,7 +31,13 @@ def decides(deviation: float, own: float, reference: float, tolerance: float, ba
     if math.isfinite(count):
         number = smallest(lambda number: rescaled(own, count, number) <= wanted, round(count))
         return f"about {number} packings" if number < _MOST else f"more than {_MOST} packings"
-    return longer if "block" in basis else f"inputs known well enough to change the value by at most ±{wanted:.2g}, now ±{own:.2g}"
+    return longer if "block" in basis else f"inputs known well enough to change the value by at most {_limits(wanted, own)}"
+
+
+def _limits(wanted: float, now: float) -> str:
+    """Both in as few digits as tell them apart."""
+    digits = next((count for count in range(2, 6) if f"{wanted:.{count}g}" != f"{now:.{count}g}"), 6)
+    return f"±{wanted:.{digits}g}, now ±{now:.{digits}g}"
 
 
 def packings(basis: str) -> float:

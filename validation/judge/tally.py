@@ -7,15 +7,17 @@ fails, and is open when one of them is open.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
+from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
+from dembark.validation.case.folders import find
 from dembark.validation.case.model import EVIDENCE
 
-from .result import QuantityRecord, from_json, results
+from .result import QuantityRecord, Result, from_json, results
 
 Item = TypeVar("Item")
 
@@ -55,13 +57,15 @@ class Counts:
 class Tally(Counts):
     """Counts of all quantities, and `by_evidence` of each kind that occurs among the checks, in the order of EVIDENCE; `unread`: a line
     for each result that could not be read and is not counted. `random`: checks that rest on intervals, of which `by_chance` are expected
-    to fail if every model held exactly. `members`: judged quantities that the checks unite."""
+    to fail if every model held exactly. `members`: judged quantities that the checks unite. `unmeasured`: declared checks that no result
+    measured, `case: names`."""
 
     members: int = 0
     by_evidence: Mapping[str, Counts] = field(default_factory=dict)
     random: int = 0
     by_chance: float = 0.0
     unread: tuple[str, ...] = ()
+    unmeasured: tuple[str, ...] = ()
 
     @property
     def sentences(self) -> list[str]:
@@ -69,6 +73,7 @@ class Tally(Counts):
         lines = [f"{kind or 'evidence'} ({MEANING[kind]}): {counts.sentence}" for kind, counts in self.by_evidence.items()]
         united = f"families: {self.members} judged values make {self.checks} checks: values that measure the same thing count once"
         return [*lines, *([united] if self.members > self.checks else []), *([self.multiplicity] if self.random else []),
+                *([f"declared, but measured by no run: {'; '.join(self.unmeasured)}"] if self.unmeasured else []),
                 *(f"not counted: {line}" for line in self.unread)]
 
     @property
@@ -118,4 +123,17 @@ def of_folder(folder: Path) -> Tally:
     verified = [one for item in (read_json(folder / VERIFICATION) or {}).get("items", []) for one in item["quantities"]]
     counted = tally([*(one for each in found for one in each.quantities), *(one for each in compared for one in each.quantities),
                      *(from_json(one, QuantityRecord, VERIFICATION) for one in verified)])
-    return replace(counted, unread=tuple(unread))
+    return replace(counted, unread=tuple(unread), unmeasured=tuple(_unmeasured(found)))
+
+
+def _unmeasured(found: Iterable[Result]) -> Iterator[str]:
+    names: dict[str, set[str]] = {}
+    for one in found:
+        names.setdefault(one.case, set()).update(quantity.name for quantity in one.quantities)
+    for case, measured in sorted(names.items()):
+        try:
+            gone = find(case).unmeasured(measured)
+        except DembarkError:  # a case that is no longer there has results all the same
+            continue
+        if gone:
+            yield f"{case}: {', '.join(gone)}"

@@ -62,6 +62,7 @@ class Section:
     description: str
     source: Sequence[str]
     missing: list[str]
+    unmeasured: list[str]  # declared checks that none of the runs measured
     checks: list[Fact]
     printed: list[Fact]
     counts: Tally
@@ -112,8 +113,9 @@ def _section(gathered: ReportData, name: str, of_page: list[tuple[Page, list[Sho
     main = [*(one for part in variants[:VARIANTS] for one in part.figures if one.main), *studies]
     drawn = next((shown for part in variants if (shown := _pictures(part.page))), [])
     return Section(name, known.title if known else name.replace("_", " "), known.description if known else "",
-                   known.source if known else (), [f"{page.words}: {text}" for page in pages for text in page.missing], checks,
-                   printed(checks), tally(row.record for row in rows), front.open_lines(rows), drawn, main, parts)
+                   known.source if known else (), [f"{page.words}: {text}" for page in pages for text in page.missing],
+                   known.unmeasured(row.record.name for row in rows) if known else [], checks, printed(checks),
+                   tally(row.record for row in rows), front.open_lines(rows), drawn, main, parts)
 
 
 def _pictures(page: Page) -> list[Shown]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from dembark.common.errors import DembarkError
+from dembark.postproc.replica import Replica
 from dembark.validation import analysis, metrics, show
 from dembark.validation.judge import measurement
 from dembark.validation.judge.result import QuantityRecord, Result
@@ -27,7 +28,7 @@ def replica(folder: Path, count: int, frames: int, force: float) -> Path:
 
 
 @pytest.mark.parametrize(("count", "frames", "force", "expected"), [
-    (1, 5, 1.0, "1 grain"), (2, 1, 1.0, "2 grains, 1 frame"), (200, 5, 0.0, "nothing presses on the wall side in the last frame"),
+    (1, 5, 1.0, "1 grain"), (2, 1, 1.0, "2 grains, 1 frame"), (200, 5, 0.0, "nothing presses on a wall in the last frame"),
     (200, 5, 1.0, "")])
 def test_what_is_too_small_is_named(tmp_path: Path, count: int, frames: int, force: float, expected: str) -> None:
     assert analysis.too_small(replica(tmp_path / "replica-1", count, frames, force)) == expected
@@ -47,10 +48,13 @@ def test_an_error_in_a_measurement_is_told_with_its_line(tmp_path: Path) -> None
     small = "the run may be too small or too short to be measured: 1 grain, 2 frames"
     assert analysis.reasons(tmp_path, caught.value, case) == (reason, small)
     # Grains more or fewer do not mend a mistake.
-    (tmp_path / "measure.py").write_text("def measure(replicas):\n    return foo\n\ndef study(name, points, along):\n    pass\n")
-    with pytest.raises(NameError) as caught:
-        measurement.measure(case, [])
-    assert analysis.reasons(tmp_path, caught.value, case) == (f"{tmp_path / 'measure.py'}, line 2, NameError: name 'foo' is not defined",)
+    run = Replica(tmp_path, {"parameters": {"gravity": 9.81}})
+    for code, kind, line in (("foo", NameError, "NameError: name 'foo' is not defined"), (
+            "replicas[0].parameters['gravty']", KeyError, "KeyError: 'there is no parameter gravty, did you mean gravity?'")):
+        (tmp_path / "measure.py").write_text(f"def measure(replicas):\n    return {code}\n\ndef study(name, points, along):\n    pass\n")
+        with pytest.raises(kind) as caught:
+            measurement.measure(case, [run])
+        assert analysis.reasons(tmp_path, caught.value, case) == (f"{tmp_path / 'measure.py'}, line 2, {line}",)
 
 
 def test_a_number_in_the_place_of_a_value_is_refused(tmp_path: Path) -> None:

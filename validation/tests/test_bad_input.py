@@ -143,6 +143,31 @@ def test_missing_or_broken_checks_are_told_before_a_run(text: str | None, expect
     assert not (tmp_path / "out").exists()
 
 
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A case of one's own from the template of packings."""
+    monkeypatch.setenv("DEMBARK_CASES", str(tmp_path / "cases"))
+    assert main(["new-case", "mine", "--template", "packing", "--in", str(tmp_path / "cases")]) == 0
+    return tmp_path / "cases/mine"
+
+
+@pytest.mark.parametrize(("file", "old", "new", "expected"), [
+    ("setup.py", "p.box_width", "p.box_widht", "there is no parameter box_widht, did you mean box_width"),
+    ("deck.in", "${gravity}", "${gravty}", "uses ${gravty}, which nothing defines, did you mean gravity"),
+    ("deck.in", '{% include "start.in" %}', '{% include "start.in" %}\n# << mobil >>', ", 'mobil' is undefined, did you mean mobile"),
+    ("case.toml", "[parameters]", "[parameters]\nwall_frction = { value = 0.5 }",
+     "no group has a parameter wall_frction, and doc is missing, [parameters.wall_frction]"),
+])
+def test_misspelt_names_of_an_own_case(file: str, old: str, new: str, expected: str, own: Path, tmp_path: Path,
+                                       capsys: pytest.CaptureFixture[str]) -> None:
+    text = (own / file).read_text()
+    assert old in text
+    (own / file).write_text(text.replace(old, new, 1))
+    capsys.readouterr()
+    refused(("deck", "mine", "--engine", "liggghts", "--out", "out"), expected, capsys)
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("place", ['Path(__file__).with_name("reference") / "film.csv"',
                                    'HERE / "reference/film.csv"', 'HERE.joinpath("film.csv")'])
 @pytest.mark.parametrize("content", [

@@ -88,6 +88,8 @@ def test_a_check_that_nothing_measures_is_told(dembark: Dembark, tmp_path: Path)
     path.write_text(path.read_text() + '\n[quantities.gone]\nlabel = "gone"\nevidence = "theory"\ntolerance = 0.1\nwhy = "noise"\n')
     done = dembark("run", "box", "--engine", "liggghts", "--out", "o")
     assert "declared, not measured in this run: gone" in done.stdout.splitlines(), done.stderr
+    done = dembark("validate", "--case", "box", "--engine", "liggghts")
+    assert "  declared, but measured by no run: box: gone" in done.stdout.splitlines(), done.stderr + done.stdout
 
 
 def test_a_failed_check_counts_only_when_asked(dembark: Dembark, tmp_path: Path) -> None:

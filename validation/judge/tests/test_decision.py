@@ -36,6 +36,7 @@ def test_that_many_packings_of_the_same_scatter_decide_and_fewer_do_not(count: i
     (math.inf, 0.0, "one run", "3 packings or more"),
     (0.2, 0.0, "the inputs", "inputs known well enough to change the value by at most ±0.1, now ±0.2"),
     (0.01, 0.3, "5 replicas", "a reference known to ±0.1, now ±0.3"),
+    (0.01, 0.1004, "5 replicas", "a reference known to ±0.1, now ±0.1004"),
     (0.01, math.inf, "5 replicas", "a reference with an interval")])
 def test_what_decides_depends_on_where_the_interval_comes_from(own: float, reference: float, basis: str, words: str) -> None:
     assert decides(0.0, own, reference, 0.1, basis) == words

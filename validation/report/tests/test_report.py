@@ -101,6 +101,8 @@ def test_the_first_page_has_a_row_for_each_case(results):
 def test_a_case_names_its_failed_identity_and_the_page_of_a_missing_case(results):
     text = results[1].partition('id="silo"')[2].partition('class="chapter"')[0]
     assert "lost momentum" in text and "2 FAILED" in text and "smooth: YADE, replica 1: the engine was killed" in results[1]
+    # The synthetic quantities are none of those that the case declares.
+    assert "Declared, but measured by no run here: " in text
 
 
 def test_html_has_contents_and_everything_and_needs_nothing_from_elsewhere(results):
