@@ -50,15 +50,16 @@ PACKAGES = {
     "Physics": ("dembark.physics",),
     "Trajectories, fields, walls": ("dembark.postproc",),
     "Results and cases": ("dembark.validation.judge", "dembark.validation.case"),
+    "Set-up of cases": ("dembark.input_decks.common.packing", "dembark.input_decks.common.setup"),
 }
 # Commands, and parts of the harness that a user does not call.
 NOT_PUBLIC = {"cli", "words", "run", "tests"}
 
 
 def modules(package: str) -> list[str]:
-    """The public modules of a package, the package first."""
+    """The public modules of a package, the package first; a module itself."""
     found = [package]
-    for one in pkgutil.iter_modules(importlib.import_module(package).__path__):
+    for one in pkgutil.iter_modules(getattr(importlib.import_module(package), "__path__", ())):
         if one.name.startswith("_") or one.name in NOT_PUBLIC:
             continue
         found += modules(f"{package}.{one.name}") if one.ispkg else [f"{package}.{one.name}"]

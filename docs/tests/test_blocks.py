@@ -42,7 +42,7 @@ RUNNERS = {
     "LIGGGHTS fragment": "test_liggghts_blocks.py", "syntax": "test_liggghts_blocks.py", "python grains.bin": "test_liggghts_blocks.py",
     "LAMMPS deck": "test_lammps_blocks.py", "LAMMPS fragment": "test_lammps_blocks.py", "LAMMPS syntax": "test_lammps_blocks.py",
     "output": "test_liggghts_blocks.py, test_docs.py", "toml": "test_toml", "shell": "test_shell", "file": "test_shell",
-    "{toctree}": "make docs", "listing": "test_listing", "picture": "test_architecture.py",
+    "{toctree}": "make docs", "listing": "test_listing", "template": "test_case_template.py", "picture": "test_architecture.py",
 }
 # Pages whose commands README.md and the page of restarts have in a similar form.
 LONG = {f"docs/how-to/{page}.md" for page in ("fields", "campaigns", "moving_walls")}
