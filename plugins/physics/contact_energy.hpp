@@ -50,7 +50,7 @@ enum class ContactPart {
   cohesive,            ///< liquid bridge or adhesion
   liquid_viscous,      ///< what the liquid of a bridge resists with
   rolling_elastic,     ///< spring of rolling resistance, yielding included
-  rolling_viscous,     ///< its dashpot, or the whole of a constant torque
+  rolling_viscous,     ///< its dashpot, or a constant torque
 };
 constexpr std::size_t contact_part_count = 8;
 constexpr std::size_t force_part_count = 6;  ///< the parts from here on are couples
@@ -61,7 +61,7 @@ struct ContactParts {
   std::array<Vec3<double>, contact_part_count> load{};
   std::size_t count = force_part_count;  ///< without rolling resistance there are no couples
   double normal_stored = 0.0;            ///< J, elastic energy at this overlap
-  double tangential_stored = 0.0;        ///< J, k_t xi^2 / 2
+  double tangential_stored = 0.0;        ///< J, k_t xi^2 / 2; with partial slip the sum over the rings
   double rolling_stored = 0.0;           ///< J, k_r theta^2 / 2
 
   DEMBARK_FUNCTION Vec3<double>& operator[](ContactPart part) { return load[static_cast<std::size_t>(part)]; }

@@ -31,7 +31,7 @@ public:
 
 	// clang-format off
 	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(FacetSurface,GlobalEngine,"Joins all :yref:`Facet` bodies to one surface: of the facets that a sphere overlaps only those have a contact on which the distance to the surface has a minimum, so that a flat patch acts as one plane, an edge counts once, and facets that lie on others do not count again. When the minimum moves to a neighbour, the interaction's geometry and physics (friction, bridge) go with it. Stands before :yref:`InteractionLoop`, which has :yref:`Ig2_FacetSurface_Sphere_ScGeom` in place of :yref:`Ig2_Facet_Sphere_ScGeom`.",
-		((Real,smoothAngle,0.05,Attr::triggerPostLoad,"Sides of a groove that form a smaller angle [rad] are one smooth surface: a sphere between them touches only the nearer one. 0 ... pi/4."))
+		((Real,smoothAngle,0.05,Attr::triggerPostLoad,"Sides of a shallow groove that are inclined to each other by less than this [rad] are one smooth surface: a sphere between them touches only the nearer one. 0 ... pi/4."))
 		((Real,precision,1e-8,Attr::triggerPostLoad,"Points of the facets nearer to each other than this [m] are one point. >= 0."))
 		((long,handedOver,0,Attr::readonly,"Number of contacts that have been handed to another facet so far"))
 		, /*ctor*/
