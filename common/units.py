@@ -17,9 +17,10 @@ from .errors import DembarkError
 if TYPE_CHECKING:
     import pint
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+# Of a number as users write it, without groups.
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 # A number or a fraction of two, then a unit, in which a digit can only be part of a power.
-_VALUE = re.compile(rf"\s*(?P<number>{_NUMBER}(?:\s*/\s*{_NUMBER})?)\s*\*?\s*(?P<unit>[^\W\d].*|[%°].*|)\s*")
+_VALUE = re.compile(rf"\s*(?P<number>{NUMBER}(?:\s*/\s*{NUMBER})?)\s*\*?\s*(?P<unit>[^\W\d].*|[%°].*|)\s*")
 _IN_UNIT = re.compile(r"(?:[^\W\d]+\d?|[%°]|(?:\^|\*\*)\s*\(?[-+]?\d+(?:\.\d+)?\)?|[*/·()]|\s+)*")
 # Products and powers of these are known without the library, which takes a while to load.
 _SYMBOL = r"(?:m|s|kg|N|Pa|J|W|rad|K)(?:\^[1-9])?"

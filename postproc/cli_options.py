@@ -9,13 +9,13 @@ from pathlib import Path
 
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
-from dembark.common.units import finite, to_si
+from dembark.common.units import NUMBER, finite, to_si
 
 from .grains import GrainFrame
 from .walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, Wall
 from .walls.patches import Patches, borders, box_patches, count_of, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
 
-_DIAMETERS = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*d\s*")
+_DIAMETERS = re.compile(rf"\s*({NUMBER})\s*d\s*")
 _KINDS: Mapping[str, tuple[str, ...]] = {
     "plane": ("origin", "normal", "velocity", "since", "u", "v", "patch"),
     "cylinder": ("radius", "axis", "origin", "outside", "velocity", "since", "height", "around", "patch"),

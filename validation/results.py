@@ -98,6 +98,12 @@ def states(folder: Path) -> list[State]:
     return [_state(folder, run) for run in plan(folder).get("runs", ())]
 
 
+def run_name(place: Path) -> str:
+    """Short name of the run at `place`, the folder CASE/VARIANT/ENGINE/replica-N: case, variant, engine, N. Steps wait for runs by it."""
+    *words, replica = place.parts[-4:]
+    return " ".join((*words, replica.rpartition("-")[2]))
+
+
 def state(folder: Path, place: str) -> State:
     """The planned run at `place` in a results folder, without a look at the others; DembarkError when it is not in the plan."""
     for run in plan(folder).get("runs", ()):
@@ -108,8 +114,7 @@ def state(folder: Path, place: str) -> State:
 
 def _state(results: Path, run: Mapping[str, Any]) -> State:
     place = results / run["folder"]
-    facts: dict[str, Any] = {"name": " ".join((*place.parts[-4:-1], run["folder"].rpartition("-")[2])),
-                             "folder": run["folder"], "inputs": run["inputs"], "estimate": run.get("estimate")}
+    facts: dict[str, Any] = {"name": run_name(place), "folder": run["folder"], "inputs": run["inputs"], "estimate": run.get("estimate")}
     done = record(place, run["inputs"])
     if done is not None:
         return State(**facts, state="finished", step=done.get("steps", 0), steps=done.get("steps", 0),

@@ -39,7 +39,7 @@ class Run:
     @property
     def name(self) -> str:
         """Short name for people: case, variant, engine and replica."""
-        return f"{self.case.name} {self.variant} {self.engine.name} {self.replica}"
+        return results.run_name(Path(self.case.name, self.variant, self.engine.name, self.folder_name))
 
     @property
     def folder_name(self) -> str:

@@ -58,7 +58,7 @@ def steps(folder: Path) -> list[Step]:
     for run in results.plan(folder).get("runs", ()):
         planned.setdefault(Path(run["folder"]).parent, {})[Path(run["folder"]).name] = run["inputs"]
     for place, runs in planned.items():
-        needs = tuple(" ".join((*place.parts, name.rpartition("-")[2])) for name in runs)
+        needs = tuple(results.run_name(place / name) for name in runs)
         given = (folder / place, place.parts[0], runs)
         found.append(Step(_name("measure", place), "measure", needs, folder / place / METRICS, partial(_of_series, *given), measure_series,
                           given))
