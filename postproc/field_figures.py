@@ -18,7 +18,6 @@ from .measurement import FIELDS_FILE as FILE
 
 Array = NDArray[np.float64]
 
-SEQUENTIAL, DIVERGING = "cividis", "RdBu_r"
 _EDGE = "#9aa1a9"
 
 

@@ -23,7 +23,7 @@ from dembark.common.files import disk_error, write_atomic
 
 from .fields.field_set import FieldSet
 from .pictures import saved
-from .style import STYLE
+from .style import DIVERGING, GRID, PALETTE, SEQUENTIAL, STYLE
 from .walls import CylinderWall, Inclusion, MeshWall, PlaneWall
 from .walls.peaks import Histogram
 from .walls.stress import WallStress
@@ -31,8 +31,6 @@ from .walls.stress import WallStress
 Array = NDArray[np.float64]
 
 _AXES = "xyz"
-_MAP, _SIGNED_MAP, _EMPTY = "cividis", "RdBu_r", "#e3e6ea"
-_PAINT = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 # What is drawn of fields by default.
 _USUAL = ("solid_fraction", "density", "velocity:magnitude", "pressure", "stress:zz", "deviator", "temperature", "coordination")
 _SHEAR = {PlaneWall: ("shear along v", "shear along u"), CylinderWall: ("shear along the axis", "shear around it"),
@@ -116,10 +114,10 @@ def _map(figure: Figure, axes: Axes, spans: Sequence[Array], values: Array, labe
     signed = low < 0.0 < high
     if signed:
         low, high = -max(-low, high), max(-low, high)
-    axes.set_facecolor(_EMPTY)
+    axes.set_facecolor(GRID)
     axes.grid(False)
-    drawn = axes.pcolormesh(*spans, np.ma.masked_invalid(values).T, cmap=_SIGNED_MAP if signed else _MAP, norm=Normalize(low, high or 1.0),
-                            rasterized=True)
+    drawn = axes.pcolormesh(*spans, np.ma.masked_invalid(values).T, cmap=DIVERGING if signed else SEQUENTIAL,
+                            norm=Normalize(low, high or 1.0), rasterized=True)
     bar = figure.colorbar(drawn, ax=axes, pad=0.02, aspect=25)
     bar.outline.set_linewidth(0.4)
     bar.ax.tick_params(labelsize=6)
@@ -152,7 +150,7 @@ def profile_figure(fields: FieldSet, names: Sequence[str], axis: str = "z") -> F
             count = known.sum(axis=others)
             mean = np.divide(np.where(known, values, 0.0).sum(axis=others), count, out=np.full(len(place), np.nan), where=count > 0)
             axes = figure.add_subplot(rows, columns, number + 1)
-            axes.plot(*((mean, place) if axis == "z" else (place, mean)), color=_PAINT[0])
+            axes.plot(*((mean, place) if axis == "z" else (place, mean)), color=PALETTE[0])
             text = axis_label(label, unit)
             axes.set(**({"xlabel": text, "ylabel": "z / mm"} if axis == "z" else {"xlabel": f"{axis} / mm", "ylabel": text}))
             (axes.xaxis if axis == "z" else axes.yaxis).set_major_formatter(_NUMBERS)
@@ -201,7 +199,7 @@ def _paint(values: Array) -> dict[str, Any]:
     known = values[np.isfinite(values)]
     norm = Normalize(*((float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)))
     return {"array": np.ma.masked_invalid(values), "norm": norm, "edgecolor": "white", "linewidth": 0.2,
-            "cmap": matplotlib.colormaps[_MAP].with_extremes(bad=_EMPTY)}
+            "cmap": matplotlib.colormaps[SEQUENTIAL].with_extremes(bad=GRID)}
 
 
 def _colour_bar(figure: Figure, paint: ScalarMappable, axes: Axes | list[Axes], label: str) -> None:
@@ -255,10 +253,10 @@ def force_figure(stress: WallStress) -> Figure:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(_WIDTH, 2.5), layout="constrained")
         axes = figure.add_subplot()
-        for axis, paint in zip(range(3), _PAINT[1:], strict=True):
+        for axis, paint in zip(range(3), PALETTE[1:4], strict=True):
             axes.plot(stress.times, stress.force[:, axis], color=paint, linewidth=0.9, label=_AXES[axis])
-        axes.plot(stress.times, stress.normal_force, color=_PAINT[0], label="normal")
-        axes.plot(stress.peak_times, stress.peak_forces, ".", color=_PAINT[0], markersize=5, label="peaks")
+        axes.plot(stress.times, stress.normal_force, color=PALETTE[0], label="normal")
+        axes.plot(stress.peak_times, stress.peak_forces, ".", color=PALETTE[0], markersize=5, label="peaks")
         axes.set(xlabel="time / s", ylabel="force / N", title=f"{stress.wall.name}: force on the grains")
         axes.legend(ncols=5, loc="best", fontsize=6.5)
     return figure
@@ -279,8 +277,8 @@ def _distribution(axes: Axes, histogram: Histogram, what: str, unit: str, wall: 
         axes.text(0.5, 0.5, "nothing to show", transform=axes.transAxes, ha="center", color="#666c75")
         return
     mean = histogram.mean
-    axes.stairs(mean * histogram.density(), histogram.edges / mean, fill=True, color=_PAINT[0], alpha=0.6)
-    axes.axvline(histogram.quantile(0.99) / mean, color=_PAINT[1], linewidth=0.9, label="99 %")
+    axes.stairs(mean * histogram.density(), histogram.edges / mean, fill=True, color=PALETTE[0], alpha=0.6)
+    axes.axvline(histogram.quantile(0.99) / mean, color=PALETTE[1], linewidth=0.9, label="99 %")
     axes.set(yscale="log", xlabel=f"{what} / mean ({mean:.3g} {unit})", ylabel="density")
     axes.set_xlim(0.0, 1.05 * histogram.largest / mean)
     axes.legend(fontsize=6.5)

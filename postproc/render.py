@@ -22,12 +22,11 @@ from numpy.typing import NDArray
 from dembark.common.errors import RunError
 
 from .grains import GrainFrame
-from .style import STYLE
+from .style import SEQUENTIAL, STYLE
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-_MAP = "cividis"
 _PIXELS = 900
 _TIMEOUT = 600
 
@@ -85,7 +84,7 @@ def _draw(scene: Scene, scale: tuple[float, float], pixels: int) -> Picture:
     size, middle = high - low, 0.5 * (high + low)
     width, height = size[0] + 0.35 * size[1], size[2] + 0.18 * size[1]
     window = [int(pixels * np.clip(width / max(height, 1e-300), 0.45, 2.2)), pixels]
-    style: dict[str, Any] = {"scalars": "value", "clim": scale, "cmap": _MAP, "nan_color": "#b9bec5", "show_scalar_bar": False}
+    style: dict[str, Any] = {"scalars": "value", "clim": scale, "cmap": SEQUENTIAL, "nan_color": "#b9bec5", "show_scalar_bar": False}
     plotter = pyvista.Plotter(off_screen=True, window_size=window)
     plotter.background_color = pyvista.Color("white")
     cloud = pyvista.PolyData(scene.positions)
@@ -112,7 +111,7 @@ def picture(scene: Scene, scale: tuple[float, float] | None = None, height: floa
         axes = figure.subplots()
         axes.imshow(image, interpolation="antialiased")
         axes.axis("off")
-        bar = figure.colorbar(ScalarMappable(Normalize(*scale), _MAP), ax=axes, shrink=0.75, aspect=22, pad=0.02, extend="both")
+        bar = figure.colorbar(ScalarMappable(Normalize(*scale), SEQUENTIAL), ax=axes, shrink=0.75, aspect=22, pad=0.02, extend="both")
         bar.set_label(scene.label)
         bar.outline.set_linewidth(0.4)
     return figure

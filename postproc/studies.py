@@ -48,11 +48,6 @@ class Comparison:
     uncertainty: float
     text: str
 
-    @property
-    def seen(self) -> bool:
-        """|E| exceeds U_val: an error of the model is seen."""
-        return abs(self.error) > self.uncertainty
-
 
 def compared(value: float, datum: Estimate, **parts: float) -> Comparison:
     """S = `value` compared with the `datum`, whose half-width is U_D; the other `parts` of U_val by what U is an index of, as num=0.1 for

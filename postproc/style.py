@@ -2,7 +2,11 @@
 
 from typing import Any
 
-INK, GRID = "#22262b", "#e3e6ea"
+INK, GREY, GRID = "#22262b", "#4a4f57", "#e3e6ea"
+# Maps of a size and of what has a sign.
+SEQUENTIAL, DIVERGING = "cividis", "RdBu_r"
+# Okabe & Ito's palette.
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 # Settings for matplotlib.rc_context.
 STYLE: dict[Any, Any] = {"font.size": 7.5, "axes.titlesize": 8.5, "axes.titleweight": "bold", "axes.titlelocation": "left",

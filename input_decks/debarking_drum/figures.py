@@ -11,10 +11,8 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from dembark.postproc.field_figures import SEQUENTIAL, FieldFigure, Looks, bar, curve, grid_table, image, limits, long_table
-from dembark.postproc.style import STYLE
-
-_SHELL = "#4a4f57"
+from dembark.postproc.field_figures import FieldFigure, Looks, bar, curve, grid_table, image, limits, long_table
+from dembark.postproc.style import GREY, SEQUENTIAL, STYLE
 
 
 def draw(datasets: Mapping[str, Any], looks: Looks) -> list[FieldFigure]:
@@ -37,7 +35,7 @@ def _map(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
             axes.add_collection(EllipseCollection(size, size, np.zeros_like(size), units="x", facecolor="none", edgecolor="white",
                                                   linewidth=0.5, offsets=np.column_stack([one.log_x.values, one.log_z.values]),
                                                   transOffset=axes.transData))
-            shell = axes.add_patch(Circle((0.0, 0.0), radius, fill=False, edgecolor=_SHELL, linewidth=1.6, clip_on=False))
+            shell = axes.add_patch(Circle((0.0, 0.0), radius, fill=False, edgecolor=GREY, linewidth=1.6, clip_on=False))
             axes.images[0].set_clip_path(shell)
             axes.set(aspect="equal", xlim=(-1.04 * radius, 1.04 * radius), ylim=(-1.04 * radius, 1.04 * radius))
             axes.set_title(looks[engine].title, loc="center")

@@ -9,8 +9,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from dembark.postproc.field_figures import DIVERGING, SEQUENTIAL, FieldFigure, Looks, bar, curve, grid_table, image, limits, long_table
-from dembark.postproc.style import STYLE
+from dembark.postproc.field_figures import FieldFigure, Looks, bar, curve, grid_table, image, limits, long_table
+from dembark.postproc.style import DIVERGING, SEQUENTIAL, STYLE
 
 # Name in the dataset, label, colour map, and whether the scale is even about zero.
 _MAPS = (

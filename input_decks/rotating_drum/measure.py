@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.input_decks.common.estimates import reference_rows
+from dembark.input_decks.common.estimates import divided, reference_rows
 from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
@@ -96,7 +96,7 @@ def measure(replicas: Replicas) -> Measurement:
             depth, angle, d = over["layer_depth"], over["surface_angle"], given["grain_diameter"]
             datum = Estimate(row["angle"], row["angle_limit"], "scatter in the other code")
             values["repose_angle"] = Value(angle, datum, reason=UNKNOWN, detail=compared(angle.value, datum, sim=angle.half).text)
-            values["layer_over_diameter"] = Value(Estimate(depth.value / d, depth.half / d, depth.basis), exact(row["layer"])
+            values["layer_over_diameter"] = Value(divided(depth, d), exact(row["layer"])
                                                   if math.isfinite(row["layer"]) else None)
     return Measurement(values, [speeds(drums, tracked_drum), densities(drums)])
 

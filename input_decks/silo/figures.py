@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from dembark.postproc.field_figures import DIVERGING, SEQUENTIAL, FieldFigure, Looks, bar, curve, grid_table, image, limits, long_table
-from dembark.postproc.style import STYLE
+from dembark.postproc.field_figures import FieldFigure, Looks, bar, curve, grid_table, image, limits, long_table
+from dembark.postproc.style import DIVERGING, GREY, SEQUENTIAL, STYLE
 
 Array = NDArray[np.float64]
 
@@ -116,7 +116,7 @@ def _profiles(datasets: Mapping[str, Any], looks: Looks) -> FieldFigure:
                 axes.set_yticklabels([])
         right[0].set_ylabel("K = σ$_{rr}$ / σ$_{zz}$")
         handles, labels = left.get_legend_handles_labels()
-        right[0].plot([], [], "*", color="#4a4f57", markersize=7, markeredgecolor="white", label="with the normal stress of the wall")
+        right[0].plot([], [], "*", color=GREY, markersize=7, markeredgecolor="white", label="with the normal stress of the wall")
         more = right[0].get_legend_handles_labels()
         figure.legend([*handles, more[0][-1]], [*labels, more[1][-1]], loc="lower center", ncols=5, fontsize=6.8, handlelength=1.6,
                       columnspacing=1.2)

@@ -117,9 +117,8 @@ def cell_average(frames: Iterable[tuple[GrainFrame, ContactFrame | None]], grid:
     return total.average(least_contacts)
 
 
-def cell_grid(frame: GrainFrame, grains: float = 10.0, through: int | None = None) -> Grid:
-    """Grid around the grains of `frame` whose cells hold about `grains` of them where they are packed: cubes, or square prisms that
-    reach right through along the axis `through` (0, 1, 2).
+def cell_grid(frame: GrainFrame, grains: float = 10.0) -> Grid:
+    """Grid around the grains of `frame` whose cells, cubes, hold about `grains` of them where they are packed.
 
     The number density is the median over the grains of that in the cell of each, in cells of four mean diameters.
     """
@@ -130,11 +129,7 @@ def cell_grid(frame: GrainFrame, grains: float = 10.0, through: int | None = Non
     trial = Grid.around(frame, 8.0 * float(frame.radii.mean()))
     home = _cells(frame.wrapped, frame, trial)
     density = float(np.median(np.bincount(home, minlength=trial.cells)[home])) / trial.cell_volume
-    if through is None:
-        return Grid.around(frame, (grains / density) ** (1.0 / 3.0))
-    spacing = np.full(3, (grains / (density * float(trial.high[through] - trial.low[through]))) ** 0.5)
-    spacing[through] = 2.0 * float(trial.high[through] - trial.low[through])
-    return Grid.around(frame, spacing)
+    return Grid.around(frame, (grains / density) ** (1.0 / 3.0))
 
 
 def _cells(places: Array, frame: GrainFrame, grid: Grid) -> NDArray[np.int64]:

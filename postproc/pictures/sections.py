@@ -23,14 +23,12 @@ from dembark.common.files import read_json
 from .. import DumpError, GrainFrame, GrainsDump
 from ..dumps import TextDump
 from ..history import read_times
-from ..style import STYLE
+from ..style import GREY, SEQUENTIAL, STYLE
 from ..walls.mesh import cut, read_stl
 from . import saved
 from .packings import HEIGHT
 
-_MAP = "cividis"
 _DOTS = 100  # an inch of an animation
-_SHELL = "#4a4f57"
 _CHAIN = "#d55e00"
 Array = NDArray[np.float64]
 
@@ -137,7 +135,7 @@ def picture(section: Section) -> bytes:
         axes = figure.subplots()
         draw(axes, section, top)
         _last(axes, section)
-        bar = figure.colorbar(ScalarMappable(Normalize(0.0, top), _MAP), ax=axes, shrink=0.75, aspect=22, pad=0.02, extend="max")
+        bar = figure.colorbar(ScalarMappable(Normalize(0.0, top), SEQUENTIAL), ax=axes, shrink=0.75, aspect=22, pad=0.02, extend="max")
         bar.set_label(section.label)
         bar.outline.set_linewidth(0.4)
     return saved(figure)
@@ -146,13 +144,13 @@ def picture(section: Section) -> bytes:
 def draw(axes: Axes, section: Section, top: float, frame: int = -1) -> None:
     """A frame in `axes`, the last one by default, speeds up to `top` on the colour scale."""
     if section.drum_radius > 0.0:
-        axes.add_patch(Circle((0.0, 0.0), section.drum_radius, fill=False, edgecolor=_SHELL, linewidth=1.6))
+        axes.add_patch(Circle((0.0, 0.0), section.drum_radius, fill=False, edgecolor=GREY, linewidth=1.6))
     if len(section.walls):
-        axes.add_collection(LineCollection(list(section.walls[frame]), colors=_SHELL, linewidths=1.2))
+        axes.add_collection(LineCollection(list(section.walls[frame]), colors=GREY, linewidths=1.2))
     size = 2.0 * section.radii
     axes.add_collection(EllipseCollection(
         size, size, np.zeros_like(size), units="x", offsets=section.places[frame], offset_transform=axes.transData,
-        array=section.speeds[frame], cmap=_MAP, norm=Normalize(0.0, top), edgecolor="white", linewidth=0.3))
+        array=section.speeds[frame], cmap=SEQUENTIAL, norm=Normalize(0.0, top), edgecolor="white", linewidth=0.3))
     axes.axis("off")
 
 
@@ -169,7 +167,7 @@ def _last(axes: Axes, section: Section) -> None:
     if section.drum_radius > 0.0 and section.drum_speed != 0.0:
         radius, turn = 0.93 * section.drum_radius, math.copysign(1.0, section.drum_speed)
         ends = [(radius * math.cos(angle), radius * math.sin(angle)) for angle in (math.pi / 2 + 0.28 * turn, math.pi / 2 - 0.28 * turn)]
-        axes.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": _SHELL,
+        axes.annotate("", ends[1], ends[0], arrowprops={"arrowstyle": "->", "color": GREY,
                                                         "connectionstyle": f"arc3,rad={-0.28 * turn}", "linewidth": 1.0})
     left, right, bottom, upper = section.last_view
     axes.set(xlim=(left, right), ylim=(bottom, upper), aspect="equal")
@@ -186,7 +184,7 @@ def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
         if section.drum_radius > 0.0:
             angles = np.arange(12) * np.pi / 6.0 - section.drum_speed * time
             marks = section.drum_radius * np.column_stack([np.cos(angles), np.sin(angles)])
-            axes.add_collection(LineCollection(list(np.stack([marks, 1.035 * marks], axis=1)), colors=_SHELL, linewidths=1.2))
+            axes.add_collection(LineCollection(list(np.stack([marks, 1.035 * marks], axis=1)), colors=GREY, linewidths=1.2))
         axes.set(xlim=(left, right), ylim=(bottom, upper))
         images.append(Image.open(io.BytesIO(saved(figure, dots=_DOTS))).convert("RGB").quantize(32))
     images[0].save(path, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)

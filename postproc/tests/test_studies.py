@@ -32,10 +32,10 @@ def test_fitted_exponent():
 
 def test_compared_tells_error_and_every_part():
     error = compared(3.0, Estimate(1.0, 0.3), num=0.4, input=1.2)
-    assert (error.error, error.uncertainty, error.seen) == (2.0, pytest.approx(1.3), True)
+    assert (error.error, error.uncertainty) == (2.0, pytest.approx(1.3))
     assert error.text == "E = 2 exceeds U_val = 1.3; U_num = 0.4, U_input = 1.2, U_D = 0.3"
     near = compared(0.0, Estimate(1.0, 1.0), sim=math.inf)
-    assert not near.seen and near.text.startswith("E = -1 is within U_val = inf")
+    assert near.text.startswith("E = -1 is within U_val = inf")
 
 
 def test_a_numerical_uncertainty_is_known_with_and_without_an_order() -> None:

@@ -18,18 +18,15 @@ from matplotlib.textpath import text_to_path
 from matplotlib.ticker import NullLocator
 
 from dembark.postproc.pictures import saved
-from dembark.postproc.style import STYLE
+from dembark.postproc.style import GREY, PALETTE, STYLE
 from dembark.validation import engines
 from dembark.validation.engines import EngineFacts
 from dembark.validation.verification.item import Item, Panel
 
 WIDE = 7.2  # inches
-INK = "#4a4f57"
 _DOTS = 220.0
 _SUBSCRIPT = re.compile(r"\b([σρμδλτuvKM])_([a-z]+)")
 DASHES = ((0, (4, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
-# Okabe & Ito's palette.
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKS = ("o", "s", "D", "^", "v", "P")
 
 
@@ -38,7 +35,7 @@ def look(engine: str) -> EngineFacts:
     if engine in engines.names():
         return engines.facts(engine)
     taken = {engines.facts(name).colour for name in engines.names()}
-    spare = [(paint, mark) for paint, mark in zip(PALETTE, MARKS, strict=True) if paint not in taken] or [(INK, "x")]
+    spare = [(paint, mark) for paint, mark in zip(PALETTE, MARKS, strict=True) if paint not in taken] or [(GREY, "x")]
     paint, mark = spare[sum(engine.encode()) % len(spare)]
     return EngineFacts(engine, engine, colour=paint, marker=mark)
 
@@ -152,7 +149,7 @@ def _panel(axes: Any, entries: Entries, handles: dict[str, Any]) -> None:
         if one.get("reference") is not None:
             same = all(_same(other, one) for _, other in entries)
             if not same or not number:
-                measured, ink = one.get("reference_low") is not None, INK if same else paint
+                measured, ink = one.get("reference_low") is not None, GREY if same else paint
                 shown = ("reference with interval" if measured else "reference") + ("" if same else f" ({engine_name(engine)})")
                 style = {"marker": "o", "markersize": 2.5, "linestyle": "none"} if measured else {"linestyle": DASHES[number % 3]}
                 handles.setdefault(shown, line(_numbers(one["reference"]), color=ink, linewidth=0.9, zorder=3, **style))
@@ -223,7 +220,7 @@ def _draw(axes: Any, panel: Panel) -> None:
     number = 0
     for curve in panel.curves:
         if curve.theory:
-            axes.plot(curve.place, curve.value, color=INK, linewidth=0.9, linestyle=DASHES[0], label=curve.label)
+            axes.plot(curve.place, curve.value, color=GREY, linewidth=0.9, linestyle=DASHES[0], label=curve.label)
         else:
             axes.plot(curve.place, curve.value, color=PALETTE[number % len(PALETTE)], marker=MARKS[number % len(MARKS)], markersize=3.2,
                       linewidth=1.1, label=curve.label)

@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from dembark.postproc.statistics import Scatter, scatter
-from dembark.postproc.style import STYLE
+from dembark.postproc.style import GREY, GRID, STYLE
 from dembark.validation.judge.result import QuantityRecord
 
-from .figures import INK, WIDE, look, shortened, symbols, text_width
+from .figures import WIDE, look, shortened, symbols, text_width
 from .gather import Row
 
 KINDS = ("experiment", "theory")
@@ -104,14 +104,14 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
         right = result.add_axes((0.76, 0.42 / tall, 0.23, 1.0 - (0.25 + 0.42) / tall))
         values = [value for one in drawn for value in (one.value, one.reference)]
         ends = 10.0 ** np.array([math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)) + 1e-9)])
-        left.fill_between(ends, ends * (1 - tolerance), ends * (1 + tolerance), color=INK, alpha=0.12, linewidth=0)
-        left.plot(ends, ends, color=INK, linewidth=0.6)
+        left.fill_between(ends, ends * (1 - tolerance), ends * (1 + tolerance), color=GREY, alpha=0.12, linewidth=0)
+        left.plot(ends, ends, color=GREY, linewidth=0.6)
         left.set(xscale="log", yscale="log", xlim=ends, ylim=ends, xlabel="reference", ylabel="measured",
                  title="Measured against reference")
         for axis in (left.xaxis, left.yaxis):
             axis.set_minor_formatter(NullFormatter())
-        right.axvspan(1 - tolerance, 1 + tolerance, color=INK, alpha=0.12, linewidth=0)
-        right.axvline(1.0, color=INK, linewidth=0.6)
+        right.axvspan(1 - tolerance, 1 + tolerance, color=GREY, alpha=0.12, linewidth=0)
+        right.axvline(1.0, color=GREY, linewidth=0.6)
         for place, engine in enumerate(engines):
             _engine(left, right, engine, place, [one for one in drawn if one.engine == engine], number, len(engines),
                     statistics([one for one in found if one.engine == engine]))
@@ -121,7 +121,7 @@ def figure(found: Sequence[Point], tolerance: float = 0.10) -> Figure | None:
         room = (right.get_position().x0 - left.get_position().x1) * WIDE - 0.2
         right.set_yticks(range(1, len(shown) + 1), [_label(number[line], line, room) for line in shown], fontsize=_LETTERS)
         right.tick_params(axis="y", length=0)
-        right.hlines(range(1, len(shown) + 1), *right.get_xlim(), color="#e3e6ea", linewidth=0.4, zorder=0)
+        right.hlines(range(1, len(shown) + 1), *right.get_xlim(), color=GRID, linewidth=0.4, zorder=0)
         handles = right.get_legend_handles_labels()
         result.legend(*handles, loc="lower left", bbox_to_anchor=(0.01, 0.0), fontsize=6.3, handlelength=1.0)
     return result

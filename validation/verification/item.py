@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dembark.postproc.measurement import Value
 from dembark.postproc.statistics import Estimate
+from dembark.postproc.studies import fitted_exponent
 from dembark.validation.case.model import Declared
 from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.judge.verdict import judged
@@ -75,5 +76,5 @@ def exact(name: str, label: str, error: float, source: str, control: str, *, tol
 
 def order(name: str, label: str, steps: Array, errors: Array, due: float, source: str, control: str, **more: Any) -> QuantityRecord:
     """Observed order of convergence, the slope of ln(error) over ln(step), against the one of theory, see `check`."""
-    slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+    slope = fitted_exponent(steps, errors)
     return check(name, label, slope, due, ORDER_TOLERANCE, evidence="theory", source=source, control=control, **more)

@@ -10,9 +10,9 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from dembark.postproc.style import STYLE
+from dembark.postproc.style import GREY, SEQUENTIAL, STYLE
 from dembark.validation.judge.result import QuantityRecord
-from dembark.validation.report.figures import INK, MARKS, WIDE, colour, engine_name, symbols
+from dembark.validation.report.figures import MARKS, WIDE, colour, engine_name, symbols
 
 from .sweeps import Sweep, words
 
@@ -54,7 +54,7 @@ def _study_panel(axes: Any, sweep: Sweep, along: str, quantity: QuantityRecord, 
             handles.setdefault(label, handle)
             known = [(at, one.reference) for at, one in line if one.reference is not None]
             if known:
-                (reference,) = axes.plot(*zip(*known, strict=True), color=INK, linewidth=0.8, linestyle=_DASHES[1], alpha=0.8, zorder=1)
+                (reference,) = axes.plot(*zip(*known, strict=True), color=GREY, linewidth=0.8, linestyle=_DASHES[1], alpha=0.8, zorder=1)
                 handles.setdefault("reference", reference)
     axes.set(xlabel=sweep.label(along), ylabel=_unit(quantity))
     axes.set_title(_title(quantity), fontsize=7.0)
@@ -105,7 +105,7 @@ def map_figure(sweep: Sweep, engine: str, quantities: Sequence[QuantityRecord]) 
                 if one is not None:
                     values[cell] = one.value
                     failed += [cell] if one.standing == "failed" else []
-            image = axes.imshow(values, origin="lower", aspect="auto", cmap="cividis")
+            image = axes.imshow(values, origin="lower", aspect="auto", cmap=SEQUENTIAL)
             for (row, column), value in np.ndenumerate(values):
                 text = "–" if np.isnan(value) else f"{value:.3g}"
                 bright = not np.isnan(value) and image.norm(value) < 0.55
