@@ -181,10 +181,14 @@ def jackknife(measure: Callable[[NDArray[np.bool_]], float], groups: NDArray[np.
     value = measure(np.ones(len(groups), bool))
     if len(labels) < _MIN_BLOCKS:
         return Estimate(value, math.inf, f"{len(labels)} {name}: too few or too correlated")
-    left_out = np.array([measure(groups != label) for label in labels])
-    count = len(labels)
-    error = math.sqrt((count - 1) / count * float(np.sum((left_out - left_out.mean()) ** 2)))
-    return Estimate(value, student(count - 1, confidence) * error, f"jackknife over {count} {name}")
+    error = float(jackknife_error(np.array([measure(groups != label) for label in labels])))
+    return Estimate(value, student(len(labels) - 1, confidence) * error, f"jackknife over {len(labels)} {name}")
+
+
+def jackknife_error(left_out: Array) -> Array:
+    """Standard errors (...) of quantities whose values without one of g groups each are `left_out` (g, ...), see `jackknife`."""
+    count = len(left_out)
+    return np.sqrt((count - 1) / count * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0))
 
 
 def combined(parts: Sequence[float]) -> float:

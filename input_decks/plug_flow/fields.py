@@ -21,7 +21,7 @@ from dembark.postproc.fields.kernels import CUTOFF
 from dembark.postproc.measurement import Array, Measurement, Replica, Value
 from dembark.postproc.output import cf_dataset, variable, with_interval
 from dembark.postproc.resampling import resampled
-from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, over_replicas, student, time_blocks
+from dembark.postproc.statistics import Estimate, TimeBlocks, block_mean, combined, jackknife_error, over_replicas, student, time_blocks
 from dembark.postproc.walls import PlaneWall, wall_contacts
 
 from .channel import Channel, free_grains
@@ -103,9 +103,7 @@ class Flow:
         basis, factor = f"jackknife over {count} time blocks", student(count - 1) * self.blocks.widening
         found = {}
         for name, values in every.items():
-            # As statistics.jackknife does for one number.
-            table = np.array([one[name] for one in left_out])
-            error = np.sqrt((count - 1) / count * ((table - table.mean(axis=0)) ** 2).sum(axis=0))
+            error = jackknife_error(np.array([one[name] for one in left_out]))
             found[name] = [Estimate(value, factor * half, basis) for value, half in zip(values, error, strict=True)]
         return found
 
