@@ -66,7 +66,8 @@ class WillettRegression {
   }
 
   DEMBARK_FUNCTION double force(double gap, double v) const {
-    const double l = std::log(std::clamp(v, 1e-6, 0.1));
+    // std::clamp may assert, which no device can.
+    const double l = std::log(std::min(std::max(v, 1e-6), 0.1));
     const double f1 = at(f1_, l);
     if (!(gap > 0.0)) return two_pi * std::exp(f1);
     const double f2 = std::max(at(f2_, l), 0.0), f3 = at(f3_, l), f4 = std::min(at(f4_, l), 0.0);
@@ -92,7 +93,7 @@ class BagheriFit {
 
   DEMBARK_FUNCTION double force(double gap, double v) const {
     const double s = gap / willett_rupture(v, theta_);
-    const double l = std::log(std::clamp(v, 1e-9, 1.0));
+    const double l = std::log(std::min(std::max(v, 1e-9), 1.0));
     const auto power = [l](double n) { return std::exp(n * l); };
     const double dry = two_pi * (1.0 - 0.3823 * power(0.2586));
     const double a = 0.4158 * power(0.2835) + 0.6474, b = -0.2087 * power(0.3113) + 2.267;
