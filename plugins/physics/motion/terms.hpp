@@ -192,6 +192,7 @@ class Table {
   explicit Table(std::vector<TableRow> rows) : rows_(std::move(rows)), slopes_(rows_.size()) {
     // Continuous second derivatives: a tridiagonal system for the slopes, of which the ends are zero.
     const std::size_t n = rows_.size();
+    for (std::size_t k = 1; k < n; ++k) finest_ = std::min(finest_, rows_[k].time - rows_[k - 1].time);
     std::vector<double> upper(n, 0.0);
     for (std::size_t k = 1; k + 1 < n; ++k) {
       const double before = rows_[k].time - rows_[k - 1].time, after = rows_[k + 1].time - rows_[k].time;
@@ -205,12 +206,7 @@ class Table {
   }
 
   const std::vector<TableRow>& rows() const { return rows_; }
-  /// s: the least time between two rows.
-  double finest() const {
-    double least = never;
-    for (std::size_t k = 1; k < rows_.size(); ++k) least = std::min(least, rows_[k].time - rows_[k - 1].time);
-    return least;
-  }
+  double finest() const { return finest_; }  ///< s: the least time between two rows
   void add(double time, WallState& to) const {
     if (rows_.empty()) return;
     const double t = time - window.start;
@@ -231,6 +227,7 @@ class Table {
  private:
   std::vector<TableRow> rows_;
   std::vector<Vec3<double>> slopes_;
+  double finest_ = never;
 };
 
 }  // namespace motion

@@ -3,10 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <iterator>
 #include <string>
-#include <tuple>
+#include <utility>
 
 #include "contact_potential.hpp"
 #include "kernels.hpp"
@@ -51,27 +50,26 @@ struct Settings {
 
   /// Name of a setting that has another value in `other`, or nullptr. Without gravity, which engines keep.
   const char* difference(const Settings& other) const {
-    static constexpr const char* names[] = {
-        "dimension", "spacing", "smoothing", "density",           "sound_speed",      "gamma", "tension", "alpha",        "delta", "kernel",
-        "boundary",  "no_slip", "shifting",  "contact_stiffness", "contact_exponent", "skin",  "threads", "slit_pressure"};
-    const auto values = [](const Settings& s) {
-      return std::tie(s.dimension, s.spacing, s.smoothing, s.state.density, s.state.sound_speed, s.state.gamma, s.state.tension, s.alpha,
-                      s.delta, s.kernel, s.boundary, s.no_slip, s.shifting.coefficient, s.contact.stiffness, s.contact.exponent, s.skin,
-                      s.threads, s.slit_pressure);
-    };
-    static_assert(std::tuple_size_v<decltype(values(other))> == std::size(names));
-    return std::apply(
-        [&](const auto&... mine) {
-          return std::apply(
-              [&](const auto&... others) {
-                const char* found = nullptr;
-                std::size_t k = 0;
-                ((found = !found && mine != others ? names[k] : found, ++k), ...);
-                return found;
-              },
-              values(other));
-        },
-        values(*this));
+    const std::pair<const char*, bool> all[] = {{"dimension", dimension != other.dimension},
+                                                {"spacing", spacing != other.spacing},
+                                                {"smoothing", smoothing != other.smoothing},
+                                                {"density", state.density != other.state.density},
+                                                {"sound_speed", state.sound_speed != other.state.sound_speed},
+                                                {"gamma", state.gamma != other.state.gamma},
+                                                {"tension", state.tension != other.state.tension},
+                                                {"alpha", alpha != other.alpha},
+                                                {"delta", delta != other.delta},
+                                                {"kernel", kernel != other.kernel},
+                                                {"boundary", boundary != other.boundary},
+                                                {"no_slip", no_slip != other.no_slip},
+                                                {"shifting", shifting.coefficient != other.shifting.coefficient},
+                                                {"contact_stiffness", contact.stiffness != other.contact.stiffness},
+                                                {"contact_exponent", contact.exponent != other.contact.exponent},
+                                                {"skin", skin != other.skin},
+                                                {"threads", threads != other.threads},
+                                                {"slit_pressure", slit_pressure != other.slit_pressure}};
+    const auto found = std::find_if(std::begin(all), std::end(all), [](const auto& one) { return one.second; });
+    return found == std::end(all) ? nullptr : found->first;
   }
   /// The one clear line about what is wrong with these settings, or nullptr.
   const char* error() const {
