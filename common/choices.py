@@ -18,11 +18,16 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"did you mean {' or '.join(close)}?" if close else f"known are {', '.join(names) or 'none'}"
 
 
+def no_parameter(name: str, known: Iterable[str]) -> str:
+    """What is said of a parameter that is not among `known`."""
+    return f"there is no parameter {name}, {nearest(name, known)}"
+
+
 class Known(dict[str, Any]):
     """A dictionary of parameters whose KeyError names near matches."""
 
     def __missing__(self, name: str) -> Any:
-        raise KeyError(f"there is no parameter {name}, {nearest(name, self)}")
+        raise KeyError(no_parameter(name, self))
 
 
 def pick(name: str, known: Iterable[str], what: str, where: str) -> str:

@@ -225,6 +225,8 @@ def joint_limit(one: float, other: float, count_one: float, count_other: float, 
     B. L. Welch, Biometrika 34 (1947) 28: the variances add, and the degrees of freedom are between the smaller of both and their sum.
     """
     degrees = (count_one - 1.0, count_other - 1.0)
+    if math.isinf(one + other):
+        return math.inf
     squares = [(half / student(degree)) ** 2 for half, degree in zip((one, other), degrees, strict=True)]
     if not sum(squares) > 0.0:
         return 0.0

@@ -17,7 +17,7 @@ from MDAnalysis.topology.base import TopologyReaderBase
 from numpy.typing import NDArray
 
 from .dumps.frames import Array, DumpError, cell
-from .dumps.series import files_of
+from .dumps.series import listed
 from .grains import GrainFrame, GrainsDump
 
 _KEPT = ("columns", "density", "skip_truncated", "units", "varying")
@@ -46,8 +46,7 @@ def _opened(filename: str, _stamp: object, options: tuple[tuple[str, Any], ...])
 
 
 def _grains(filename: str | Path, options: dict[str, Any]) -> _Grains:
-    files = files_of(filename)
-    stats = [file.stat() for file in ([files] if isinstance(files, Path) else files) if file.is_file()]
+    stats = [file.stat() for file in listed(filename) if file.is_file()]
     kept = tuple((name, tuple(value) if isinstance(value := options[name], list) else value) for name in _KEPT if name in options)
     return _opened(str(filename), tuple((stat.st_size, stat.st_mtime_ns) for stat in stats), kept)
 

@@ -13,6 +13,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
+from dembark.common.errors import DembarkError
+from dembark.validation import engines
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 
@@ -186,3 +191,11 @@ def replaced(command: str) -> tuple[str, str]:
 def not_run(command: str) -> str:
     """Why a command is not run here; empty for those that are."""
     return next((why for pattern, why in NOT_RUN if re.fullmatch(pattern, command)), "")
+
+
+def built(engine: str) -> engines.Engine:
+    """The engine; the test is skipped where it was not built."""
+    try:
+        return engines.find(engine)
+    except DembarkError as error:
+        pytest.skip(str(error))

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from blocks import NOT_RUN, ROOT, SUBSTITUTES, Block, blocks, commands, logical_lines, not_run, replaced
+from blocks import NOT_RUN, ROOT, SUBSTITUTES, Block, blocks, built, commands, logical_lines, not_run, replaced
 
 from dembark.common.errors import DembarkError
 from dembark.validation import engines
@@ -48,14 +48,6 @@ RUNNERS = {
 LONG = {f"docs/how-to/{page}.md" for page in ("fields", "campaigns", "moving_walls")}
 SHELL_PAGES = [pytest.param(page, id=page, marks=pytest.mark.full if page in LONG else ())
                for page in dict.fromkeys(block.page for block in blocks("shell"))]
-
-
-def found(engine: str) -> engines.Engine:
-    """The engine; the test is skipped where it was not built."""
-    try:
-        return engines.find(engine)
-    except DembarkError as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="module")
@@ -113,14 +105,14 @@ def run(words: list[str], capture: pytest.CaptureFixture[str]) -> None:
             folders.load.cache_clear()
     elif program == "dembark" and rest[0] != "yade":
         if "yade" in rest:
-            found("yade")
+            built("yade")
         code = main(rest)
         assert code == 0, capture.readouterr().err
     else:
         if program == "liggghts-dembark":
-            words[0] = str(found("liggghts").executable)
+            words[0] = str(built("liggghts").executable)
         elif program == "dembark":
-            found("yade")
+            built("yade")
             words[0] = str(Path(sys.executable).with_name("dembark"))
         elif program == "python":
             words[0] = sys.executable
@@ -136,7 +128,7 @@ def options(words: list[str]) -> set[str]:
 
 @pytest.mark.parametrize("page", SHELL_PAGES)
 def test_shell(page: str, user: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found("liggghts")
+    built("liggghts")
     write_files(page)
     without_yade = []
     for block in (block for block in blocks("shell") if block.page == page):

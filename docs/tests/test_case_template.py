@@ -6,11 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blocks import blocks
+from blocks import blocks, built
 
-from dembark.common.errors import DembarkError
 from dembark.postproc import GrainsDump, read_times
-from dembark.validation import engines
 from dembark.validation.cli import main
 
 SETUP = '''
@@ -34,10 +32,7 @@ def setup(p):
 
 @pytest.mark.parametrize("engine", ["liggghts", "lammps"])
 def test_glued_grains_below_a_funnel(engine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    try:
-        engines.find(engine)
-    except DembarkError as error:
-        pytest.skip(str(error))
+    built(engine)
     (block,) = blocks("template")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DEMBARK_CASES", str(tmp_path))

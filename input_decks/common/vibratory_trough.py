@@ -8,11 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replica, Value, block_mean, exact, profile
 from dembark.postproc.replica import cached_per_replica
-from dembark.postproc.statistics import combined, jackknife
+from dembark.postproc.statistics import CONFIDENCE, jackknife, joint_limit
 from dembark.postproc.studies import measured
 
 from .drive_phases import Phases, cell_means, read_phases
@@ -188,12 +187,12 @@ def numerical_changes(points: Points, quantities: Sequence[str]) -> Measurement:
     the n points could have been the ends, so its half-width holds for all n (n - 1) / 2 differences together (Bonferroni)."""
     values = {}
     pairs = max(1, len(points) * (len(points) - 1) // 2)
-    wider = float(norm.ppf(1.0 - 0.025 / pairs) / norm.ppf(0.975))
     for quantity in quantities:
         found = [measured(point, quantity) for point in points]
         low, high = (pick(found, key=lambda one: one.value) for pick in (min, max))
         size = abs(float(np.mean([one.value for one in found])))
-        change = Estimate((high.value - low.value) / size, wider * combined([low.half, high.half]) / size, "propagated from the points")
+        half = joint_limit(low.half, high.half, math.inf, math.inf, 1.0 - (1.0 - CONFIDENCE) / pairs)
+        change = Estimate((high.value - low.value) / size, half / size, "propagated from the points")
         values[f"{quantity}_change"] = Value(change, exact(0.0))
     return Measurement(values)
 

@@ -37,6 +37,12 @@ def _fault(one: Dump, entry: Entry) -> str:
     return ""
 
 
+def listed(path: str | Path | Sequence[str | Path]) -> list[Path]:
+    """The files of files_of(), one file too."""
+    found = files_of(path)
+    return [found] if isinstance(found, Path) else found
+
+
 class SeriesDump(Dump):
     """The frames of several files as one trajectory; see Dump. `path` is a pattern or a list, as files_of() takes it; `open_one` opens a
     file without making its index."""
@@ -45,19 +51,15 @@ class SeriesDump(Dump):
                  stream: bool = False, units: str = "") -> None:
         """Open; DumpError for a missing, foreign or truncated file."""
         self._pattern, self._open_one = path, open_one
-        self._files = self._look()
+        self._files = listed(path)
         super().__init__(self._files[0], skip_truncated=skip_truncated, stream=stream, units=units)
-
-    def _look(self) -> list[Path]:
-        found = files_of(self._pattern)
-        return [found] if isinstance(found, Path) else found
 
     def _where(self, entry: Entry) -> str:
         return f"{self._files[entry.file]}, frame {entry.number}"
 
     def _find(self) -> Iterator[Entry]:
         files: dict[tuple[int, ...], Path] = {}
-        self._files = self._look()  # a run may have written more of them
+        self._files = listed(self._pattern)  # a run may have written more of them
         for number, path in enumerate(self._files):
             try:
                 one, steps = self._open_one(path), []

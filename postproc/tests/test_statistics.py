@@ -114,6 +114,7 @@ def test_joint_limit_is_exceeded_as_often_as_it_says(counts):
     assert joint_limit(1.0, 1.0, 5, 5, 0.999) > joint_limit(1.0, 1.0, 5, 5, 0.95)
     assert joint_limit(1.96, 0.0, math.inf, math.inf, 0.95) == pytest.approx(1.96, rel=1e-4)
     assert joint_limit(0.0, 0.0, 3, 3, 0.99) == 0.0
+    assert joint_limit(math.inf, 0.1, math.inf, 5, 0.99) == joint_limit(0.1, math.inf, 3, 3, 0.95) == math.inf
 
 
 def test_the_chance_of_a_value_beyond_a_limit_is_that_of_its_interval():

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 import numpy as np
 
-from dembark.common.choices import Value, nearest
+from dembark.common.choices import Value, nearest, no_parameter
 from dembark.common.errors import DembarkError
 from dembark.common.extras import advice
 from dembark.validation import engines
@@ -65,7 +65,7 @@ class _Known(SimpleNamespace):
     """Parameters and derived numbers, as setup.py gets them."""
 
     def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"there is no parameter {name}, {nearest(name, vars(self))}")
+        raise AttributeError(no_parameter(name, vars(self)))
 
 
 @cache
