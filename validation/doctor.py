@@ -14,6 +14,7 @@ from pathlib import Path
 from dembark.common.checkout import checkout
 from dembark.common.errors import DembarkError
 from dembark.common.extras import install_line
+from dembark.common.units import size_text
 from dembark.validation import engines, provenance
 from dembark.validation.case import folders
 
@@ -88,5 +89,5 @@ def examine() -> list[Finding]:
         Finding("Slurm", shutil.which("sbatch"), False, "only on clusters; campaigns run here without it"),
         Finding("commit", commit["commit"] and commit["commit"][:12] + (" with changes" if commit["dirty"] else ""), False,
                 "not a Git checkout: results will not state a commit"),
-        Finding("machine", f"{os.cpu_count()} cores, {free >> 30} GB free in this folder", False),
+        Finding("machine", f"{os.cpu_count()} cores, {size_text(free)} free in this folder", False),
     ]

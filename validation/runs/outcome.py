@@ -11,6 +11,7 @@ from pathlib import Path
 from dembark.common.choices import Value
 from dembark.common.errors import Killed, RunError
 from dembark.common.files import DISK_FULL, check_impacts, check_times, count_frames
+from dembark.common.units import size_text
 from dembark.validation.campaigns.plan import Run
 from dembark.validation.case.model import OUTPUTS
 
@@ -61,13 +62,13 @@ def check_room(run: Run, folder: Path) -> None:
         return
     need, free = run.output_size + _RESERVE, shutil.disk_usage(folder).free
     if free < need:
-        raise RunError("the disk is too full", f"{folder} has {free >> 20} MB free", f"the run needs about {need >> 20} MB")
+        raise RunError("the disk is too full", f"{folder} has {size_text(free)} free", f"the run needs about {size_text(need)}")
 
 
 def check_disk(work: Path) -> None:
     """RunError when next to nothing is free on the disk of `work`, on which the run is writing."""
     if shutil.disk_usage(work).free < _RESERVE:
-        raise RunError(DISK_FULL, f"less than {_RESERVE >> 20} MB are free in {work.parent}")
+        raise RunError(DISK_FULL, f"less than {size_text(_RESERVE)} are free in {work.parent}")
 
 
 def _tail(log: Path, size: int = 20000) -> list[str]:
