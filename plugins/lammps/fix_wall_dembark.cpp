@@ -97,6 +97,10 @@ std::string FixWallDembark::not_for(int type) const {
          " no dembark/granular; give it, or take a group without them";
 }
 
+void FixWallDembark::refuse_coincidence(int i) const {
+  error->one(FLERR, "fix wall/dembark: the centre of grain {} lies on the wall", atom->tag[i]);
+}
+
 /// Takes up where the wall is now.
 void FixWallDembark::move() {
   // The clock first sees the beginning of the step, from which on a time step may be a new one.
@@ -168,7 +172,7 @@ void FixWallDembark::act_on(int i, bool advance) {
     const double volume = state.cohesion.bridge_volume;
     const bool was_held = state.cohesion.held();
     const dembark::ContactForce out = contact_step(p, b, update->dt, state, advance);
-    if (dembark::has_no_direction(out.normal)) error->one(FLERR, "fix wall/dembark: the centre of grain {} lies on the wall", atom->tag[i]);
+    if (dembark::has_no_direction(out.normal)) refuse_coincidence(i);
     const bool touching = out.overlap > 0.0;
     if (advance && !was_held && (state.cohesion.held() || (liquid_ && touching)))
       dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);

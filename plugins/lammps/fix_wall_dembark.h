@@ -52,34 +52,37 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
       if (slot[1 + layout_.cohesion_at()] > 0.0) visit(slot[1 + layout_.cohesion_at()], slot[1 + layout_.imbalance_at()]);
   }
 
- private:
+ protected:
   int wall_type_ = 0;
   std::unique_ptr<dembark_lammps::WallSurface> surface_;
   std::unique_ptr<dembark_family::MovingWall> moving_;  // nullptr: it stands, or its region moves by itself
   dembark::WallFrame frame_;
   class PairDembarkGranular* pair_ = nullptr;
-  class FixCapillaryLiquid* liquid_ = nullptr;
   dembark::HistoryLayout layout_;
   // A row has of each contact the number of the part of the surface plus one, and the history.
-  double** force_ = nullptr;    // of each grain: of the wall on it, N
-  std::vector<double> before_;  // the row of the grain in work before this step
-  std::vector<double> overlaps_;
+  double** force_ = nullptr;                       // of each grain: of the wall on it, N
   std::array<double, 8> totals_{}, all_totals_{};  // on this process, and on all at the step `summed_`
   bigint summed_ = -1;
 
+  int slot_size() const { return 1 + layout_.size(); }
   dembark_lammps::EnergyTally* tally_ = nullptr;
+  std::string not_for(int type) const;
+  [[noreturn]] void refuse_coincidence(int i) const;
+  void move();
+  dembark::Vec3<double> origin() const;
+
+ private:
+  class FixCapillaryLiquid* liquid_ = nullptr;
+  std::vector<double> before_;  // the row of the grain in work before this step
+  std::vector<double> overlaps_;
 
   std::string region_state() const;
-  int slot_size() const { return 1 + layout_.size(); }
   /// In restart files before a row: negative, as no part of a surface is.
   double layout_key() const { return -1.0 - layout_.code(); }
   void find_pair();
   void check_types();
-  std::string not_for(int type) const;
-  void move();
   void act_on(int i, bool advance);
   const double* history_of(const dembark_lammps::WallContact& contact, const dembark::Vec3<double>& centre, double radius) const;
-  dembark::Vec3<double> origin() const;
   const std::array<double, 8>& totals();
   dembark::WallLoad load();
 };

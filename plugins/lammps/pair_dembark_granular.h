@@ -38,6 +38,7 @@ class PairDembarkGranular : public Pair, dembark_family::PackedContacts {
   const dembark_lammps::NeighborHistory& history() const { return *history_; }
   /// kg, of a grain or its rigid body; infinite for an atom of fix freeze.
   double mass(int i) const;
+  int freeze_bit() const { return freeze_bit_; }
   /// m, of all grains, those that fixes will insert included.
   double largest_radius() const;
 

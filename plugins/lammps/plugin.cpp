@@ -79,6 +79,8 @@ void lammpsplugin_init(void* host, void* handle, void* register_style) {
   for (const char* const name : {"dembark/granular/kk", "dembark/granular/kk/device"}) add("pair", name, "the same in a Kokkos kernel");
   style.creator.fix = &dembark_lammps::create_kokkos_history;
   add("fix", "NEIGH_HISTORY/DEMBARK/KK", "histories of its contacts");
+  style.creator.fix = &dembark_lammps::create_kokkos_wall;
+  add("fix", "wall/dembark/kk", "contacts with planes and cylinders in a Kokkos kernel");
 #endif
   style.creator.fix = &create_fix<LAMMPS_NS::FixWallDembark>;
   add("fix", "wall/dembark", "the same contacts with the surface of a region or of an STL file");

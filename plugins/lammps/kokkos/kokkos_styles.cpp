@@ -3,6 +3,7 @@
 #include "error.h"
 #include "lammps.h"
 
+#include "fix_wall_dembark_kokkos.h"
 #include "pair_dembark_granular_kokkos.h"
 
 using LAMMPS_NS::LAMMPS;
@@ -15,6 +16,14 @@ void* create_kokkos_pair(void* lammps) {
 
 void* create_kokkos_history(void* lammps, int narg, char** arg) {
   return static_cast<LAMMPS_NS::Fix*>(new LAMMPS_NS::FixNeighHistoryDembark<LMPDeviceType>(static_cast<LAMMPS*>(lammps), narg, arg));
+}
+
+void* create_kokkos_wall(void* lammps, int narg, char** arg) {
+  typedef LAMMPS_NS::FixWallDembarkKokkos<LMPDeviceType> OnDevice;
+  LAMMPS* const host = static_cast<LAMMPS*>(lammps);
+  LAMMPS_NS::Fix* const fix =
+      OnDevice::knows(*host, narg, arg) ? new OnDevice(host, narg, arg) : new LAMMPS_NS::FixWallDembark(host, narg, arg);
+  return fix;
 }
 
 }  // namespace dembark_lammps

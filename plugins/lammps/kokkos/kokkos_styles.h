@@ -6,6 +6,8 @@ namespace dembark_lammps {
 
 void* create_kokkos_pair(void* lammps);
 void* create_kokkos_history(void* lammps, int narg, char** arg);
+/// The style without suffix for surfaces that a device does not know.
+void* create_kokkos_wall(void* lammps, int narg, char** arg);
 
 }  // namespace dembark_lammps
 

@@ -88,12 +88,65 @@ def test_threads_add_in_another_order(settled, tmp_path):
     assert_same(one[-1], two[-1], 1e-9)
 
 
+WALLS = {
+    "plane": ("plane 0 0 0 0 0 1", ""),
+    "plane_out": ("plane 0 0 0 0 0 -1 side out", ""),
+    "oblique": ("plane 0.012 0.012 -0.002 0.1 0.05 1", ""),
+    "block": ("block EDGE EDGE EDGE EDGE 0 0.04", ""),
+    "cylinder": ("cylinder z 0.012 0.012 0.0165 0 INF", ""),
+    "drum": ("cylinder y 0.012 0.0125 0.0165 INF INF", "motion rotation point 0.012 0 0.0125 axis 0 1 0 rate 5"),
+    "shaken": ("plane 0 0 0 0 0 1", "motion harmonic amplitude 0 0 0.0005 frequency 40 ramp 1"),
+    "open": ("block EDGE EDGE EDGE EDGE 0 0.04 open 6", ""),  # a region that the device does not know
+    "union": ("plane 0 0 0 0 0 1 units box\nregion roof plane 0 0 0.04 0 0 -1 units box\nregion both intersect 2 floor roof", ""),
+}
+
+
+def in_vessel(text, wall):
+    region, motion = WALLS[wall]
+    units = "" if wall == "union" else " units box"
+    text = text.replace("region floor plane 0 0 0 0 0 1 units box", f"region floor {region}{units}")
+    if wall in {"oblique", "cylinder", "drum"}:  # they are not periodic
+        text = text.replace("boundary p p f", "boundary f f f")
+        text = text.replace("block 0 0.024 0 0.024 -0.001 0.05", "block -0.02 0.044 -0.02 0.044 -0.02 0.06")
+    name = "both" if wall == "union" else "floor"
+    return text.replace("region floor type 3", f"region {name} type 3 {motion}")
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_walls_are_the_hosts(tmp_path, ranks):
-    host = run(tmp_path / "host", bed("run 1000"), kokkos=False)
-    device = run(tmp_path / "device", bed("run 1000", head="processors * * 1"), ranks=ranks)
-    assert np.abs(device[-1][:, 16:19]).max() > 0.0
+@pytest.mark.parametrize("wall", WALLS)
+@pytest.mark.parametrize("material", ["linear", "bridges"])
+def test_walls_are_those_of_the_host(tmp_path, material, wall, ranks):
+    """Grains fall, and some go over the periodic edges to the other rank with their contacts."""
+    text = in_vessel(bed("run 2000", material=MATERIALS[material], head="processors * * 1", every=500), wall)
+    host, device = run(tmp_path / "host", text, kokkos=False), run(tmp_path / "device", text, ranks=ranks)
+    assert np.abs(host[-1][:, 16:19]).max() > 0.0
     assert_same(host[-1], device[-1], 1e-8)
+    assert np.abs(host[-1][:, 16:19] - device[-1][:, 16:19]).max() <= 1e-8 * np.abs(host[-1][:, 16:19]).max()
+
+
+@pytest.mark.parametrize("wall", ["drum", "shaken"])
+def test_totals_of_walls_are_those_of_the_host(tmp_path, wall):
+    numbers = " ".join(f"f_floor[{k}]" for k in range(1, 26))
+    text = in_vessel(bed(f"fix out all ave/time 500 1 500 {numbers} file totals.txt format ' %.15g'\nrun 1000"), wall)
+    for folder in ("host", "device"):
+        run(tmp_path / folder, text, kokkos=folder == "device")
+    host, device = (np.loadtxt(tmp_path / folder / "totals.txt") for folder in ("host", "device"))
+    assert host.shape == (3, 26) and (np.abs(host).max(axis=0)[[1, 4, 7]] > 0.0).any()
+    assert np.allclose(device, host, rtol=1e-7, atol=1e-9 * np.abs(host[:, 1:]).max())
+
+
+def test_histories_at_walls_go_into_restart_files(tmp_path):
+    """And goes on in the style without suffix, which reads the same file."""
+    text = in_vessel(bed("run 1000\nwrite_restart cut.restart\nrun 500", every=500, material=DRY), "block")
+    long = run(tmp_path, text)
+    again = in_vessel(bed("run 500", create="read_restart cut.restart", state="", every=500, material=DRY), "block")
+    assert_same(long[-1], run(tmp_path, again)[-1], 1e-8)
+
+
+def test_walls_of_kokkos_leave_energies_to_the_host(tmp_path):
+    text = bed("fix account all energy/account\nrun 0").replace("pair_style", "suffix off\npair_style", 1)
+    done = start(tmp_path, text.replace("region floor", "suffix on\nregion floor", 1))
+    assert done.returncode != 0 and "suffix off" in done.stdout + done.stderr, (done.stdout + done.stderr)[-1500:]
 
 
 @pytest.mark.parametrize("material", MATERIALS)

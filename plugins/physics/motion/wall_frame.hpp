@@ -20,13 +20,15 @@ class WallFrame {
         less_cosine_(2.0 * std::pow(std::sin(0.5 * state.angle), 2)) {}
 
   /// Where in the wall's frame a place (m) is.
-  Vec3<double> inside(const Vec3<double>& place) const { return moves_ ? origin_ + turned(place - centre_, -sine_) : place; }
+  DEMBARK_FUNCTION Vec3<double> inside(const Vec3<double>& place) const {
+    return moves_ ? origin_ + turned(place - centre_, -sine_) : place;
+  }
   /// A vector of the wall's frame, as it is seen from outside.
-  Vec3<double> outside(const Vec3<double>& vector) const { return moves_ ? turned(vector, sine_) : vector; }
+  DEMBARK_FUNCTION Vec3<double> outside(const Vec3<double>& vector) const { return moves_ ? turned(vector, sine_) : vector; }
 
  private:
   /// Rodrigues' formula; with 1 - cos, for small angles.
-  Vec3<double> turned(const Vec3<double>& v, double sine) const {
+  DEMBARK_FUNCTION Vec3<double> turned(const Vec3<double>& v, double sine) const {
     const Vec3<double> side = cross(axis_, v);
     return v + sine * side + less_cosine_ * cross(axis_, side);
   }

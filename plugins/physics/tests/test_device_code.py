@@ -62,3 +62,17 @@ def test_what_a_device_cannot_run_is_refused(tmp_path: Path, language: str, what
     function, says = REFUSED[what]
     (tmp_path / "refused.hpp").write_text(function + "\n", encoding="utf-8")
     assert says in errors(tmp_path, language, f'-DREFUSED="{tmp_path}/refused.hpp"')
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_frames_of_moving_walls_are_device_code(tmp_path: Path, language: str) -> None:
+    """Which kernels of walls take along; every_law.hpp has laws only."""
+    (tmp_path / "frame.hpp").write_text(
+        '#include "dembark/motion/wall_frame.hpp"\n'
+        "DEMBARK_FUNCTION inline double refused(double x) {\n"
+        "  const dembark::WallFrame frame;\n"
+        "  return dembark::norm(frame.inside({x, x, x}) + frame.outside({x, x, x}));\n"
+        "}\n",
+        encoding="utf-8",
+    )
+    assert not errors(tmp_path, language, f'-DREFUSED="{tmp_path}/frame.hpp"')
