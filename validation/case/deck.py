@@ -41,7 +41,8 @@ def load_module(path: Path, name: str) -> ModuleType:
     spec = importlib.util.spec_from_file_location(f"{name}.{path.stem}", path)
     if spec is None or spec.loader is None:
         raise DembarkError(f"{path} cannot be loaded")
-    for known in [one for one in sys.modules if one.startswith(f"{name}.")]:
+    # From a copy: another thread may be importing.
+    for known in [one for one in tuple(sys.modules) if one.startswith(f"{name}.")]:
         del sys.modules[known]
     importlib.invalidate_caches()
     package, module = ModuleType(name), importlib.util.module_from_spec(spec)

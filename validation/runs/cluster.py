@@ -2,7 +2,8 @@
 
 Runs that may use the same resources form an array, each element of which is one run (`job.py`). The same array is submitted once more for
 each retry, to begin when the one before it has ended: elements whose run is finished return at once. The last job measures and writes the
-report. The locks of the runs see to it that no run is computed twice at the same time.
+report, when also the arrays of earlier submissions have ended: they may still repeat runs. The locks of the runs see to it that no run is
+computed twice at the same time.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import shlex
 import shutil
 import sys
 import tempfile
+import time
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -29,33 +31,46 @@ JOBS = ".jobs"
 
 
 def submit(plan: Plan, folder: Path, site: Site, at_a_time: int | None = None) -> list[str]:
-    """Submit the runs of `plan` in its results folder that are neither finished nor running, and the job that reports; returns lines for
-    people. DembarkError with the scheduler's own words when it refuses a job; those submitted before are named."""
-    kept = {state.folder for state in results.states(folder) if state.state in ("finished", "running")}
-    arrays: dict[Resources, list[str]] = {}
+    """Submit the runs of `plan` in its results folder that are neither finished nor running, retries of those that run, and the job that
+    reports; returns lines for people. DembarkError with the scheduler's own words when it refuses a job; it names those submitted
+    before."""
+    states = {state.folder: state.state for state in results.states(folder)}
+    arrays: dict[tuple[Resources, bool], list[str]] = {}
     for place in plan.folders:
-        if place not in kept:
-            arrays.setdefault(replace(plan.resources[Path(place).parent], restart_interval=None), []).append(place)
-    stamp = f"dembark-{plan.label}-{datetime.now().astimezone():%y%m%d-%H%M%S}"
+        if states.get(place) != "finished":
+            used = replace(plan.resources[Path(place).parent], restart_interval=None)
+            arrays.setdefault((used, states.get(place) == "running"), []).append(place)
+    stamp = _stamp(plan.label, folder / JOBS)
     sent: list[tuple[str, str]] = []
-    last: list[tuple[str, str]] = []
+    earlier = [(job, script.stem) for script in sorted((folder / JOBS).glob("*.sh")) for job in site.waiting(script.stem)]
+    last = list(earlier)
     try:
-        for used, places in arrays.items():
+        for (used, running), places in arrays.items():
             for first in range(0, len(places), site.largest_array):
-                chunk, after = places[first:first + site.largest_array], list[tuple[str, str]]()
-                for attempt in range(1 + plan.retries):
+                # A run that runs may still fail, and its submitter may have died before it submitted the retries.
+                chunk, after = places[first:first + site.largest_array], earlier if running else []
+                for attempt in range(int(running), 1 + plan.retries):
                     name = f"{stamp}-{len(sent) + 1}"
                     after = [(_send(folder, site, name, used, chunk, after, attempt > 0, at_a_time), name)]
                     sent += after
-                last += after
+                last += [one for one in after if one not in last]
         name = f"{stamp}-{REPORT}"
         sent.append((_send(folder, site, name, plan.measure, [REPORT], last, False, None), name))
     except DembarkError as error:
         before = ", ".join(job for job, _ in sent)
         raise DembarkError(str(error), f"submitted before: {before}" if before else "nothing was submitted") from None
-    count = sum(map(len, arrays.values()))
+    count = sum(len(places) for (_, running), places in arrays.items() if not running)
     return [f"submitted {count} runs in {len(sent)} jobs: {' '.join(job for job, _ in sent)}",
             f"{len(plan.folders) - count} of {len(plan.folders)} runs are finished or running"]
+
+
+def _stamp(label: str, jobs: Path) -> str:
+    """The beginning of the names of a submission's jobs, by which the scheduler is asked for them: no other submission has it."""
+    while True:
+        stamp = f"dembark-{label}-{datetime.now().astimezone():%y%m%d-%H%M%S}"
+        if not any(jobs.glob(f"{stamp}-*")):
+            return stamp
+        time.sleep(0.1)
 
 
 def check(plan: Plan, site: Site) -> None:

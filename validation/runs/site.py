@@ -17,12 +17,12 @@ from dembark.validation.case.tables import TableReader, Types, load_toml
 
 SHIPPED = Path(__file__).with_name("sites")
 _KEYS: dict[str, Types] = {"submit": str, "header": str, "array": str, "index": str, "after": str, "each": str, "join": str, "memory": str,
-                           "time": str, "at_a_time": int, "largest_array": int, "preamble": str}
+                           "time": str, "at_a_time": int, "largest_array": int, "preamble": str, "queued": str}
 _NEEDED = ("submit", "header", "array", "index", "after")
 # The words in braces of each key.
 _JOB = ("name", "log", "ranks", "threads", "cores", "memory_mb", "minutes", "seconds")
 _WORDS = {"header": _JOB, "array": (*_JOB, "last", "count", "at_a_time"), "after": ("jobs",), "each": ("job", "name"),
-          "submit": ("script",)}
+          "submit": ("script",), "queued": ("name",)}
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,7 @@ class Site:
     at_a_time: int = 100
     largest_array: int = 1000
     preamble: str = ""
+    queued: str = ""
 
     def environment(self) -> dict[str, str]:
         """This process's environment after the preamble; DembarkError when that fails."""
@@ -80,6 +81,17 @@ class Site:
         if done.returncode or not done.stdout.strip():
             raise DembarkError("the scheduler refused a job", last_words(done), f"see {script} and {self.path}")
         return done.stdout.split()[0].partition(";")[0]
+
+    def waiting(self, name: str) -> list[str]:
+        """Numbers of the jobs called `name` that wait or run; none where the site's file does not say how to ask."""
+        if not self.queued:
+            return []
+        try:
+            done = subprocess.run(["bash", "-c", self.queued.format(name=shlex.quote(name))], capture_output=True, text=True,
+                                  errors="replace", stdin=subprocess.DEVNULL, timeout=60, check=False)
+        except subprocess.TimeoutExpired:
+            return []
+        return list(dict.fromkeys(done.stdout.split()))
 
 
 def last_words(done: subprocess.CompletedProcess[str]) -> str:

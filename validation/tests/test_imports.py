@@ -1,6 +1,9 @@
 """Which files a Python file depends on, read from its source."""
 
+import sys
+import threading
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -101,6 +104,29 @@ def test_cases_may_have_modules_of_one_name(tmp_path: Path) -> None:
         (tmp_path / name / "measure.py").write_text("from .helper import NAME\n")
     found = [deck.load_module(tmp_path / name / "measure.py", f"dembark_measure_{name}") for name in ("first", "second")]
     assert [one.NAME for one in found] == ["first", "second"]
+
+
+def test_a_module_is_loaded_while_another_thread_imports(tmp_path: Path) -> None:
+    (tmp_path / "measure.py").write_text("x = 1\n")
+    ended, before = threading.Event(), sys.getswitchinterval()
+
+    def import_others() -> None:
+        while not ended.is_set():
+            for number in range(100):
+                sys.modules[f"dembark_other_{number}"] = ModuleType("other")
+            for number in range(100):
+                del sys.modules[f"dembark_other_{number}"]
+
+    other = threading.Thread(target=import_others)
+    sys.setswitchinterval(1e-6)
+    try:
+        other.start()
+        for _ in range(200):
+            assert deck.load_module(tmp_path / "measure.py", "dembark_measure_box").x == 1
+    finally:
+        ended.set()
+        other.join()
+        sys.setswitchinterval(before)
 
 
 def test_modules_of_one_name_in_two_folders_of_a_case_are_both_inputs(tmp_path: Path) -> None:

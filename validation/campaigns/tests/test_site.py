@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,14 @@ def test_scripts_of_all_schedulers(tmp_path: Path, name: str) -> None:
     assert lines[0] == "#!/bin/bash" and lines[-1] == "run it" and set(EXPECTED[name]) <= set(lines)
     alone = one.script("job", Path("/log"), Resources(), 1, [], "run it")
     assert "%100" in alone and not any(word in alone for word in ("afterany", "ended"))
+
+
+def test_jobs_that_wait_or_run_are_known_by_their_names(tmp_path: Path) -> None:
+    asked = re.sub(r'queued = ".*"', 'queued = "test {name} = known && printf \'7\\\\n7\\\\n8\\\\n\'"', TEXT)
+    one = written(tmp_path, asked)
+    assert one.waiting("known") == ["7", "8"] and one.waiting("other name") == []
+    silent = written(tmp_path, re.sub(r'queued = ".*"', "", TEXT))
+    assert silent.waiting("known") == []
 
 
 def test_the_preamble_sets_the_environment(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import ANY
 
 import pytest
 from harness import command, decks, engine_pid, environment, lives, stand_in, stand_in_analysis, start, wait_for  # noqa: F401
@@ -53,6 +54,58 @@ restart_interval = "0.0001 s"
 
 def logs(results: Path) -> str:
     return "".join((results / name).read_text() for name in ("campaign.log",) if (results / name).is_file())
+
+
+# A scheduler that numbers jobs, keeps those of the first submission in its queue, and starts none.
+SITE = '''
+submit = "wc -l < queue; grep -m 1 job-name {script} | cut -d= -f2 >> queue"
+header = "# job-name={name}"
+array = ""
+index = "0"
+after = "# after {jobs}"
+queued = "grep -x -n {name} queue | cut -d: -f1"
+'''
+
+
+@pytest.fixture
+def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The queue of that scheduler, and the campaign."""
+    monkeypatch.chdir(tmp_path)
+    Path("queue").write_text("of another user\n", encoding="utf-8")
+    Path("boxes.toml").write_text(CAMPAIGN, encoding="utf-8")
+    Path("site.toml").write_text(SITE, encoding="utf-8")
+    return tmp_path / "queue"
+
+
+def awaited(job: str) -> set[str]:
+    (after,) = re.findall(r"^# after (.*)$", Path("results/.jobs", f"{job}.sh").read_text(encoding="utf-8"), re.MULTILINE)
+    return set(after.split(":"))
+
+
+def test_a_report_waits_for_the_jobs_of_earlier_submissions(queue: Path, command: Command) -> None:
+    for words in (["submit", "boxes.toml", "--executor", "site.toml", "--out", "results"], ["resume", "results"]):
+        assert command(*words) == (0, ANY, ANY)
+    jobs = queue.read_text(encoding="utf-8").splitlines()
+    (first, second) = (number for number, name in enumerate(jobs) if name.endswith("report"))
+    assert {str(number) for number in range(2, first + 2)} <= awaited(jobs[second])
+
+
+def test_a_run_that_runs_is_submitted_to_be_repeated(queue: Path, command: Command) -> None:
+    """It may fail, and the submission that started it may have been cut off before its retries."""
+    words = ["--executor", "site.toml", "--out", "results"]
+    assert command("submit", "boxes.toml", *words) == (0, ANY, ANY)
+    before = len(queue.read_text(encoding="utf-8").splitlines())
+    place = next(line for path in sorted(Path("results/.jobs").glob("*.runs")) for line in path.read_text().splitlines() if "yade" in line)
+    held = tables.lock_file(Path("results", place))
+    held.parent.mkdir(parents=True, exist_ok=True)
+    with lock(held, "held"):
+        code, _, said = command("resume", "results")
+    assert code == 0 and "1 of 5 runs are finished or running" in said
+    jobs = queue.read_text(encoding="utf-8").splitlines()[before:]
+    again = [job for job in jobs if place in Path("results/.jobs", f"{job}.runs").read_text(encoding="utf-8").splitlines()]
+    assert len(again) == 2
+    assert all("--again" in Path("results/.jobs", f"{job}.sh").read_text(encoding="utf-8") for job in again)
+    assert {str(number) for number in range(2, before + 1)} <= awaited(again[0])
 
 
 @pytest.fixture
