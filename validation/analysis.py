@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.postproc import DumpError, GrainsDump
+from dembark.postproc import DumpError, DumpWarning, GrainsDump
 from dembark.validation.case.deck import failed
 from dembark.validation.case.model import Case
 
@@ -40,6 +40,19 @@ def reasons(folder: Path, error: Exception, case: Case) -> tuple[str, ...]:
     small = () if isinstance(error, _MISTAKES) else (too_small(path) for path in sorted(folder.glob("replica-*")))
     worst = next(filter(None, small), "")
     return (reason, f"the run may be too small or too short to be measured: {worst}") if worst else (reason,)
+
+
+def departed(replica: Path) -> str:
+    """How many grains of a finished run are no longer in its last frame; '' when none has left, or there are no frames."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DumpWarning)  # the measurement says them
+            counts = GrainsDump(replica / "grains.dump").counts
+    except DumpError:
+        return ""
+    most = int(counts.max(initial=0))
+    gone = most - int(counts[-1]) if len(counts) else 0
+    return f"{replica.name}: {gone} of {most} grains are no longer in the last frame" if gone else ""
 
 
 def too_small(replica: Path) -> str:

@@ -70,7 +70,8 @@ def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str
 
             fields = FIELDS_FILE
             write_netcdf(folder / fields, found.fields)
-    noted = replace(found, remarks=[*found.remarks, *dict.fromkeys(warnings)], fields=None)
+    gone = filter(None, (analysis.departed(one.folder) for one in runs))
+    noted = replace(found, remarks=[*found.remarks, *gone, *dict.fromkeys(warnings)], fields=None)
     return measurement_file.write(folder, measurement_file.Measured(inputs_hash, noted, provenance.measured(), fields))
 
 

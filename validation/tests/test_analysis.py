@@ -34,6 +34,17 @@ def test_what_is_too_small_is_named(tmp_path: Path, count: int, frames: int, for
     assert analysis.too_small(replica(tmp_path / "replica-1", count, frames, force)) == expected
 
 
+def test_grains_that_left_are_counted(tmp_path: Path) -> None:
+    folder = replica(tmp_path / "replica-1", 5, 2, 0.0)
+    assert analysis.departed(folder) == ""
+    for count in (6, 2):
+        lines = replica(tmp_path / f"other-{count}", count, 1, 0.0) / "grains.dump"
+        with (folder / "grains.dump").open("a") as dump:
+            dump.write(lines.read_text().replace("TIMESTEP\n0", f"TIMESTEP\n{20 - count}"))
+    assert analysis.departed(folder) == "replica-1: 4 of 6 grains are no longer in the last frame"
+    assert analysis.departed(tmp_path / "nothing") == ""
+
+
 def test_an_error_in_a_measurement_is_told_with_its_line(tmp_path: Path) -> None:
     case = SimpleNamespace(name="mine", folder=tmp_path, studies=("size",))
     (tmp_path / "measure.py").write_text("def measure(replicas):\n    return 1 / 0\n\n"
