@@ -143,6 +143,18 @@ def test_histories_at_walls_go_into_restart_files(tmp_path):
     assert_same(long[-1], run(tmp_path, again)[-1], 1e-8)
 
 
+def test_contacts_with_walls_go_on_where_grains_enter(tmp_path):
+    """Arrays grow, and grains get other places in memory."""
+    enter = "".join(f"create_atoms 1 single {0.003 + 0.006 * k} 0.012 0.03\n" for k in range(3))
+    enter += "set atom 49*51 diameter 0.005 density 2500\n"
+    leave = "group gone id 4\ndelete_atoms group gone compress no\n"
+    text = bed(f"run 1500\n{enter}run 500\n{leave}run 500", material=DRY, every=500, head="atom_modify sort 100 0.005")
+    host, device = run(tmp_path / "host", text, kokkos=False), run(tmp_path / "device", text)
+    assert len(host[0]) == 48 and len(host[-1]) == 50
+    assert_same(host[-1], device[-1], 1e-8)
+    assert np.abs(host[-1][:, 16:19] - device[-1][:, 16:19]).max() <= 1e-8 * np.abs(host[-1][:, 16:19]).max()
+
+
 def test_walls_of_kokkos_leave_energies_to_the_host(tmp_path):
     text = bed("fix account all energy/account\nrun 0").replace("pair_style", "suffix off\npair_style", 1)
     done = start(tmp_path, text.replace("region floor", "suffix on\nregion floor", 1))
