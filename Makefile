@@ -141,8 +141,9 @@ test-arm: ## run the tests of the headers as code for 64-bit ARM, in an emulator
 	        -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 -DCMAKE_CXX_COMPILER=$(arm)-g++ -- ninja -C $(BUILD)/aarch64 -j $(JOBS) physics-tests
 	@qemu-aarch64 -L /usr/$(arm) $(BUILD)/aarch64/bin/physics-tests --reporter compact
 
+# Tests with a scheduler mostly wait: one process more than there are cores.
 test-full: all ## run the long tests: schedulers, page counts, every deck in every engine
-	@$(BIN)/python -m pytest --full -m full --numprocesses $(TEST_JOBS) --dist loadscope --durations 20 $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest --full -m full --numprocesses $$(($(TEST_JOBS) + 1)) --dist loadscope --durations 20 $(PYTEST_ARGS)
 
 docs: $(BUILD)/.python ## build the site of the documentation (build/docs/index.html)
 	@$(BIN)/sphinx-build -q -b html -n -W --keep-going -j auto -c docs -d $(BUILD)/docs-doctrees . $(BUILD)/docs
