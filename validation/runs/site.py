@@ -49,8 +49,7 @@ class Site:
         # What it prints must not get into the list of variables; one of comments alone needs a command.
         script = f"set -e\n{{ :\n{self.preamble}\n}} >&2\nenv -0"
         try:
-            done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
-                                  timeout=120, check=False)
+            done = _by_bash(script, 120)
         except subprocess.TimeoutExpired:
             raise DembarkError(f"the preamble of {self.path} has not ended after two minutes", "", "try it in a shell") from None
         if done.returncode:
@@ -74,8 +73,7 @@ class Site:
         it is refused."""
         command = self.submit.format(script=shlex.quote(str(script)))
         try:
-            done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
-                                  timeout=300, check=False)
+            done = _by_bash(command, 300)
         except subprocess.TimeoutExpired:
             raise DembarkError("the scheduler does not answer", f"to {command}", "try again later with 'dembark resume'") from None
         if done.returncode or not done.stdout.strip():
@@ -87,11 +85,16 @@ class Site:
         if not self.queued:
             return []
         try:
-            done = subprocess.run(["bash", "-c", self.queued.format(name=shlex.quote(name))], capture_output=True, text=True,
-                                  errors="replace", stdin=subprocess.DEVNULL, timeout=60, check=False)
+            done = _by_bash(self.queued.format(name=shlex.quote(name)), 60)
         except subprocess.TimeoutExpired:
             return []
         return list(dict.fromkeys(done.stdout.split()))
+
+
+def _by_bash(command: str, seconds: float) -> subprocess.CompletedProcess[str]:
+    """What `command` said; subprocess.TimeoutExpired after `seconds`."""
+    return subprocess.run(["bash", "-c", command], capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
+                          timeout=seconds, check=False)
 
 
 def last_words(done: subprocess.CompletedProcess[str]) -> str:
