@@ -63,9 +63,9 @@ class FixWallDembark : public dembark_lammps::RowsFix<dembark_family::SharedFix>
   double** force_ = nullptr;                       // of each grain: of the wall on it, N
   std::array<double, 8> totals_{}, all_totals_{};  // on this process, and on all at the step `summed_`
   bigint summed_ = -1;
+  dembark_lammps::EnergyTally* tally_ = nullptr;
 
   int slot_size() const { return 1 + layout_.size(); }
-  dembark_lammps::EnergyTally* tally_ = nullptr;
   std::string not_for(int type) const;
   [[noreturn]] void refuse_coincidence(int i) const;
   void move();

@@ -2,32 +2,19 @@
 #ifndef DEMBARK_CONTACT_KERNEL_H
 #define DEMBARK_CONTACT_KERNEL_H
 
-#include "kokkos_type.h"
-
-#include "dembark/contact_history.hpp"
-
-#include "device_laws.h"
+#include "grain_views.h"
 
 namespace dembark_lammps {
-
-/// Why the run cannot go on; the first that a kernel finds.
-struct Fault {
-  enum Kind { none, coincidence, time_step, reach };
-  int kind = none;
-  int i = 0, j = 0;
-  double limit = 0.0;  ///< s, or m
-};
-
-/// Numbers of a contact that the layout knows of, at most, without those of carried liquid.
-constexpr int most_numbers = 5 + 2 + dembark::ring_numbers + 3;
 
 /// `neighflag`: of the package KOKKOS; HALFTHREAD adds forces atomically. Each grain has all its owned and ghost partners (newton off).
 ///
 /// Histories are rows of layout.size() + 1 numbers. LAMMPS hands a row to the other grain of a pair with all its signs turned over. The
 /// last number says so: 1 as stored, -1 turned over, 0 without a history.
 template <class DeviceType, int neighflag>
-struct ContactKernel {
-  typedef ArrayTypes<DeviceType> AT;
+struct ContactKernel : GrainViews<DeviceType> {
+  typedef GrainViews<DeviceType> Views;
+  typedef typename Views::AT AT;
+  typedef typename Views::Vec3 Vec3;
   typedef EV_FLOAT value_type;
   typedef Kokkos::View<F_FLOAT* [3], typename DAT::t_f_array::array_layout, typename KKDevice<DeviceType>::value,
                        Kokkos::MemoryTraits<AtomicF<neighflag>::value>>
@@ -35,44 +22,30 @@ struct ContactKernel {
   typedef Kokkos::View<F_FLOAT* [6], typename DAT::t_virial_array::array_layout, typename KKDevice<DeviceType>::value,
                        Kokkos::MemoryTraits<AtomicF<neighflag>::value>>
       Virials;
-  typedef dembark::Vec3<double> Vec3;
+  using Views::add;
+  using Views::advance;
+  using Views::dt;
+  using Views::inertial_mass;
+  using Views::laws;
+  using Views::layout;
+  using Views::omega;
+  using Views::radius;
+  using Views::report;
+  using Views::type;
+  using Views::v;
+  using Views::vector;
+  using Views::x;
 
-  typename AT::t_x_array_randomread x;
-  typename AT::t_v_array_randomread v, omega;
-  typename AT::t_int_1d_randomread type, mask;
-  typename AT::t_float_1d_randomread mass, radius;
   Sums force, torque;
   Virials atom_virials;
   typename AT::t_neighbors_2d neighbors;
   typename AT::t_int_1d_randomread grains, neighbor_counts;
   typename AT::t_int_2d flags;
   typename AT::t_float_2d rows;
-  typename DeviceLaws<DeviceType>::Reader laws;
-  Kokkos::View<Fault, DeviceType> fault;
-  dembark::HistoryLayout layout;
-  double dt = 0.0, skin = 0.0;
+  double skin = 0.0;
   double special[4] = {};
-  int own = 0, frozen = 0;
-  bool advance = true, global_virial = false, each_virial = false;
-
-  template <class View>
-  KOKKOS_INLINE_FUNCTION static Vec3 vector(const View& of, int i) {
-    return {of(i, 0), of(i, 1), of(i, 2)};
-  }
-  template <class View>
-  KOKKOS_INLINE_FUNCTION static void add(const View& to, int i, const Vec3& value) {
-    to(i, 0) += value.x;
-    to(i, 1) += value.y;
-    to(i, 2) += value.z;
-  }
-
-  KOKKOS_INLINE_FUNCTION void report(Fault::Kind kind, int i, int j, double limit) const {
-    Fault& there = fault();
-    if (Kokkos::atomic_compare_exchange(&there.kind, int(Fault::none), int(kind)) != Fault::none) return;
-    there.i = i;
-    there.j = j;
-    there.limit = limit;
-  }
+  int own = 0;
+  bool global_virial = false, each_virial = false;
 
   KOKKOS_INLINE_FUNCTION bool load(int i, int jj, dembark::ContactState& state) const {
     const int size = layout.size(), first = jj * (size + 1);
@@ -107,11 +80,7 @@ struct ContactKernel {
   KOKKOS_INLINE_FUNCTION void operator()(const int ii, EV_FLOAT& sums) const {
     const int i = grains[ii];
     const Vec3 place = vector(x, i);
-    dembark::ContactBodies b;
-    b.velocity_1 = vector(v, i);
-    b.angular_velocity_1 = vector(omega, i);
-    b.radius_1 = radius[i];
-    b.mass_1 = mask[i] & frozen ? INFINITY : mass[i];
+    dembark::ContactBodies b = this->body(i);
     Vec3 own_force{}, own_torque{};
     const int count = neighbor_counts[i];
     for (int jj = 0; jj < count; ++jj) {
@@ -126,7 +95,7 @@ struct ContactKernel {
       }
       b.velocity_2 = vector(v, j);
       b.angular_velocity_2 = vector(omega, j);
-      b.mass_2 = mask[j] & frozen ? INFINITY : mass[j];
+      b.mass_2 = inertial_mass(j);
       const dembark::ContactParameters& p = laws(type[i], type[j]);
       dembark::ContactState state;
       if (had) load(i, jj, state);

@@ -25,7 +25,7 @@ FixWallDembarkKokkos<DeviceType>::FixWallDembarkKokkos(LAMMPS* lmp, int narg, ch
   execution_space = ExecutionSpaceFromDevice<DeviceType>::space;
   datamask_modify = F_MASK | TORQUE_MASK;
   datamask_read = X_MASK | V_MASK | OMEGA_MASK | TYPE_MASK | MASK_MASK | RMASS_MASK | RADIUS_MASK | datamask_modify;
-  fault_ = Kokkos::View<Fault, DeviceType>("dembark:fault");
+  fault_ = dembark_lammps::FaultView<DeviceType>("dembark:fault");
   memory->destroy(force_);
   FixWallDembarkKokkos::grow_arrays(atom->nmax);
 }
@@ -105,13 +105,7 @@ void FixWallDembarkKokkos<DeviceType>::post_force(int) {
   k_rows_.template sync<DeviceType>();
 
   dembark_lammps::WallKernel<DeviceType> kernel;
-  kernel.x = atomKK->k_x.view<DeviceType>();
-  kernel.v = atomKK->k_v.view<DeviceType>();
-  kernel.omega = atomKK->k_omega.view<DeviceType>();
-  kernel.type = atomKK->k_type.view<DeviceType>();
-  kernel.mask = atomKK->k_mask.view<DeviceType>();
-  kernel.mass = atomKK->k_rmass.view<DeviceType>();
-  kernel.radius = atomKK->k_radius.view<DeviceType>();
+  kernel.see(*atomKK);
   kernel.force = atomKK->k_f.view<DeviceType>();
   kernel.torque = atomKK->k_torque.view<DeviceType>();
   kernel.wall_force = k_force_.template view<DeviceType>();
@@ -140,8 +134,7 @@ void FixWallDembarkKokkos<DeviceType>::post_force(int) {
   k_force_.template modify<DeviceType>();
   k_force_.sync_host();  // dumps and other fixes read it without a word
 
-  Fault fault;
-  Kokkos::deep_copy(Kokkos::View<Fault, Kokkos::HostSpace, Kokkos::MemoryTraits<Kokkos::Unmanaged>>(&fault), fault_);
+  const Fault fault = dembark_lammps::found(fault_);
   if (fault.kind != Fault::none) stop_at(fault);
 }
 

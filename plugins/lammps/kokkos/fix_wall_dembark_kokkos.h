@@ -4,11 +4,8 @@
 
 #include <vector>
 
-#include "kokkos_type.h"
-
-#include "contact_kernel.h"
-#include "device_laws.h"
 #include "fix_wall_dembark.h"
+#include "grain_views.h"
 #include "wall_faces.h"
 
 namespace dembark_lammps {
@@ -23,38 +20,34 @@ struct WallTotals {
 
 /// The contacts of a grain with all faces. A row has of each face whether there is a history, and the history.
 template <class DeviceType>
-struct WallKernel {
-  typedef ArrayTypes<DeviceType> AT;
+struct WallKernel : GrainViews<DeviceType> {
+  typedef GrainViews<DeviceType> Views;
+  typedef typename Views::AT AT;
+  typedef typename Views::Vec3 Vec3;
   typedef WallTotals value_type;
-  typedef dembark::Vec3<double> Vec3;
+  using Views::add;
+  using Views::advance;
+  using Views::dt;
+  using Views::laws;
+  using Views::layout;
+  using Views::mask;
+  using Views::radius;
+  using Views::report;
+  using Views::type;
+  using Views::vector;
+  using Views::x;
 
-  typename AT::t_x_array_randomread x;
-  typename AT::t_v_array_randomread v, omega;
-  typename AT::t_int_1d_randomread type, mask;
-  typename AT::t_float_1d_randomread mass, radius;
   typename AT::t_f_array force, torque;
   typename AT::t_float_2d wall_force, rows;
-  typename DeviceLaws<DeviceType>::Reader laws;
-  Kokkos::View<Fault, DeviceType> fault;
-  dembark::HistoryLayout layout;
   dembark::WallFrame frame;
   WallFace faces[most_faces];
   Vec3 velocity{}, spin{}, centre{};  ///< of the wall, m/s at `centre`, rad/s and m
-  double dt = 0.0;
-  int face_count = 0, wall_type = 0, group = 0, frozen = 0;
-  bool advance = true;
-
-  KOKKOS_INLINE_FUNCTION void report(Fault::Kind kind, int i, double limit) const {
-    Fault& there = fault();
-    if (Kokkos::atomic_compare_exchange(&there.kind, int(Fault::none), int(kind)) != Fault::none) return;
-    there.i = i;
-    there.limit = limit;
-  }
+  int face_count = 0, wall_type = 0, group = 0;
 
   KOKKOS_INLINE_FUNCTION void operator()(const int i, WallTotals& sums) const {
     for (int k = 0; k < 3; ++k) wall_force(i, k) = 0.0;
     if (!(mask[i] & group)) return;
-    const Vec3 place{x(i, 0), x(i, 1), x(i, 2)}, inside = frame.inside(place);
+    const Vec3 place = vector(x, i), inside = frame.inside(place);
     Vec3 arms[most_faces];
     double distances[most_faces];
     bool near = true;
@@ -72,12 +65,8 @@ struct WallKernel {
         if (advance) rows(i, first) = 0.0;
         continue;
       }
-      dembark::ContactBodies b;
+      dembark::ContactBodies b = this->body(i);
       b.separation = frame.outside(arms[k]);
-      b.velocity_1 = {v(i, 0), v(i, 1), v(i, 2)};
-      b.angular_velocity_1 = {omega(i, 0), omega(i, 1), omega(i, 2)};
-      b.radius_1 = radius[i];
-      b.mass_1 = mask[i] & frozen ? INFINITY : mass[i];
       b.wall_spin = spin;
       b.velocity_2 = velocity + cross(spin, place - b.separation - centre);
       double row[most_numbers];
@@ -89,11 +78,11 @@ struct WallKernel {
       const bool was_held = state.cohesion.held();
       const dembark::ContactParameters& p = laws(type[i], wall_type);
       const dembark::ContactForce out = contact_step(p, b, dt, state, advance);
-      if (dembark::has_no_direction(out.normal)) report(Fault::coincidence, i, 0.0);
+      if (dembark::has_no_direction(out.normal)) report(Fault::coincidence, i, i, 0.0);
       if (advance) {
         if (state.cohesion.held() && !was_held) {
           const double limit = p.cohesion.liquid.stable_time_step(b.effective_radius(), b.effective_mass());
-          if (dt > limit) report(Fault::time_step, i, limit);
+          if (dt > limit) report(Fault::time_step, i, i, limit);
         }
         rows(i, first) = out.interacting;
         layout.store(row, state);
@@ -105,15 +94,12 @@ struct WallKernel {
       sums.value[6] += out.overlap > 0.0;
       sums.value[7] += state.cohesion.held();
     }
+    add(force, i, total);
+    add(torque, i, moment);
+    add(wall_force, i, total);
     const Vec3 about = cross(place - centre, total) + moment;
     const double all[6] = {total.x, total.y, total.z, about.x, about.y, about.z};
-    const double turns[3] = {moment.x, moment.y, moment.z};
     for (int k = 0; k < 6; ++k) sums.value[k] += all[k];
-    for (int k = 0; k < 3; ++k) {
-      force(i, k) += all[k];
-      torque(i, k) += turns[k];
-      wall_force(i, k) = all[k];
-    }
   }
 };
 
@@ -147,7 +133,7 @@ class FixWallDembarkKokkos : public FixWallDembark {
  private:
   std::vector<dembark_lammps::WallFace> faces_;
   dembark_lammps::DeviceLaws<DeviceType> laws_;
-  Kokkos::View<dembark_lammps::Fault, DeviceType> fault_;
+  dembark_lammps::FaultView<DeviceType> fault_;
   DAT::tdual_float_2d k_rows_, k_force_;
   bool on_device_ = false;
   int count_ = 0;  // of grains whose rows the device has

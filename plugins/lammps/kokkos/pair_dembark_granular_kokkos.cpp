@@ -29,7 +29,7 @@ PairDembarkGranularKokkos<DeviceType>::PairDembarkGranularKokkos(LAMMPS* lmp) : 
   execution_space = ExecutionSpaceFromDevice<DeviceType>::space;
   datamask_modify = F_MASK | TORQUE_MASK | ENERGY_MASK | VIRIAL_MASK;
   datamask_read = X_MASK | V_MASK | OMEGA_MASK | TYPE_MASK | MASK_MASK | RMASS_MASK | RADIUS_MASK | datamask_modify;
-  fault_ = Kokkos::View<Fault, DeviceType>("dembark:fault");
+  fault_ = dembark_lammps::FaultView<DeviceType>("dembark:fault");
 }
 
 template <class DeviceType>
@@ -99,8 +99,7 @@ void PairDembarkGranularKokkos<DeviceType>::compute(int eflag, int vflag) {
     k_vatom.template modify<DeviceType>();
     k_vatom.template sync<LMPHostType>();
   }
-  Fault fault;
-  Kokkos::deep_copy(Kokkos::View<Fault, Kokkos::HostSpace, Kokkos::MemoryTraits<Kokkos::Unmanaged>>(&fault), fault_);
+  const Fault fault = dembark_lammps::found(fault_);
   if (fault.kind != Fault::none) stop_at(fault);
 }
 
@@ -108,13 +107,7 @@ template <class DeviceType>
 template <int neighflag>
 void PairDembarkGranularKokkos<DeviceType>::advance_contacts() {
   dembark_lammps::ContactKernel<DeviceType, neighflag> kernel;
-  kernel.x = atomKK->k_x.view<DeviceType>();
-  kernel.v = atomKK->k_v.view<DeviceType>();
-  kernel.omega = atomKK->k_omega.view<DeviceType>();
-  kernel.type = atomKK->k_type.view<DeviceType>();
-  kernel.mask = atomKK->k_mask.view<DeviceType>();
-  kernel.mass = atomKK->k_rmass.view<DeviceType>();
-  kernel.radius = atomKK->k_radius.view<DeviceType>();
+  kernel.see(*atomKK);
   kernel.force = atomKK->k_f.view<DeviceType>();
   kernel.torque = atomKK->k_torque.view<DeviceType>();
   if (vflag_atom) kernel.atom_virials = k_vatom.template view<DeviceType>();

@@ -2,10 +2,7 @@
 #ifndef DEMBARK_PAIR_DEMBARK_GRANULAR_KOKKOS_H
 #define DEMBARK_PAIR_DEMBARK_GRANULAR_KOKKOS_H
 
-#include "kokkos_type.h"
-
 #include "contact_kernel.h"
-#include "device_laws.h"
 #include "fix_neigh_history_dembark.h"
 #include "pair_dembark_granular.h"
 
@@ -27,7 +24,7 @@ class PairDembarkGranularKokkos : public PairDembarkGranular {
  private:
   FixNeighHistoryDembark<DeviceType>* rows_ = nullptr;
   dembark_lammps::DeviceLaws<DeviceType> laws_;
-  Kokkos::View<dembark_lammps::Fault, DeviceType> fault_;
+  dembark_lammps::FaultView<DeviceType> fault_;
   DAT::tdual_efloat_1d k_eatom;
   DAT::tdual_virial_array k_vatom;
 
