@@ -19,7 +19,7 @@
 
 namespace yade {
 
-YADE_PLUGIN((LogWall)(LcpImpact)(LogImpact));
+YADE_PLUGIN((LogWall)(LcpImpact));
 
 using dembark_yade::fail;
 using dembark_yade::text;

@@ -127,16 +127,6 @@ private:
 };
 REGISTER_SERIALIZABLE(LcpImpact);
 
-class LogImpact : public LcpImpact {
-public:
-	virtual ~LogImpact() = default;
-	void pyHandleCustomCtorArgs(boost::python::tuple&, boost::python::dict&) override;
-	// clang-format off
-	YADE_CLASS_BASE_DOC(LogImpact,LcpImpact,"Former name of :yref:`LcpImpact`, for one version.");
-	// clang-format on
-};
-REGISTER_SERIALIZABLE(LogImpact);
-
 }  // namespace yade
 
 DEMBARK_SAVED_FORMAT(LogWall, 1)

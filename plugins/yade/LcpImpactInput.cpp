@@ -177,13 +177,6 @@ void LcpImpact::pyHandleCustomCtorArgs(boost::python::tuple&, boost::python::dic
 	                            {"walls", &LcpImpact::setWalls}});
 }
 
-void LogImpact::pyHandleCustomCtorArgs(boost::python::tuple& words, boost::python::dict& kw) {
-	// With warnings made errors, Python has one set.
-	if (PyErr_WarnEx(PyExc_FutureWarning, "dembark: LogImpact is now LcpImpact; the old name goes with the next version", 1) < 0)
-		boost::python::throw_error_already_set();
-	LcpImpact::pyHandleCustomCtorArgs(words, kw);
-}
-
 boost::python::object LcpImpact::getStiffness() const { return lcp_input::stiffness.show(stiffnessRows); }
 boost::python::object LcpImpact::getDamping() const { return lcp_input::damping.show(dampingRows); }
 boost::python::object LcpImpact::getFriction() const { return lcp_input::friction.show(frictionRows); }

@@ -7,7 +7,6 @@ Formulas: docs/theory/lcp.md.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Unpack
@@ -42,12 +41,6 @@ class Impact:
     relative_speed: float  # m/s, approach along the normal at the beginning, positive = closing
     dissipated: float  # J, in this contact
     point: tuple[float, float, float]  # m, of contact at the beginning
-
-    @property
-    def place(self) -> tuple[float, float, float]:
-        """Former name of `point`, for one version."""
-        warnings.warn("Impact.place is now Impact.point; the old name goes with the next version", FutureWarning, stacklevel=2)
-        return self.point
 
 
 @dataclass(frozen=True)
@@ -303,16 +296,6 @@ def _walls(walls: Sequence[Plane | Drum], materials: int) -> tuple[Floats, Float
     return np.array(planes, dtype=float).reshape(-1, 12), np.array(drums, dtype=float).reshape(-1, 11)
 
 
-class _Contact(dict[str, object]):
-    """Of ImpactSystem.contacts()."""
-
-    def __missing__(self, key: str) -> object:
-        if key != "place":
-            raise KeyError(key)
-        warnings.warn("'place' is now 'point'; the old name goes with the next version", FutureWarning, stacklevel=2)
-        return self["point"]
-
-
 class ImpactSystem:
     """Logs in cross-section (positions with two components) or balls (three), with planes, a drum and friction.
 
@@ -387,8 +370,8 @@ class ImpactSystem:
         """What the last instant was solved for: contacts with a force now or before, and pairs that the free motion could close. Of each
         a, b (as in Impact), gap (m), normal_force (N), opening (m), tangential (N, on a), normal (towards a), point (m)."""
         rows = np.asarray(self._scene.begun().contacts())
-        return [_Contact({"a": int(r[0]), "b": int(r[1]), "gap": float(r[5]), "normal_force": float(r[6]), "opening": float(r[13]),
-                          "tangential": r[7:10].copy(), "normal": r[2:5].copy(), "point": r[10:13].copy()}) for r in rows]
+        return [{"a": int(r[0]), "b": int(r[1]), "gap": float(r[5]), "normal_force": float(r[6]), "opening": float(r[13]),
+                 "tangential": r[7:10].copy(), "normal": r[2:5].copy(), "point": r[10:13].copy()} for r in rows]
 
     def state(self) -> Floats:
         """Everything needed to go on bit for bit."""

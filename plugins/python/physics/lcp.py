@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -57,12 +56,6 @@ class LcpResult:
     def active(self) -> NDArray[np.bool_]:
         """(n,) flags, z_i > 0: the `start` for a problem that is nearly the same."""
         return self.z > 0.0
-
-    @property
-    def guarded(self) -> bool:
-        """The former name of `used_fallback`."""
-        warnings.warn("LcpResult.guarded is now LcpResult.used_fallback", DeprecationWarning, stacklevel=2)
-        return self.used_fallback
 
 
 class LcpSolver:

@@ -137,16 +137,3 @@ def test_line_and_code_of_a_run(yade, call, parts, code):
     assert done.returncode == code
     assert "Traceback" not in done.stderr
     assert "went on" not in done.stdout
-
-
-def test_the_former_name_works_and_says_so(yade):
-    done = run(yade, """
-        import warnings
-        scene()
-        with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
-            step(LogImpact(stiffness=1e7, walls=[floor]))
-        assert isinstance(O.engines[1], LcpImpact) and O.engines[1].contactCount > 0
-        assert [str(each.message) for each in told] == ["dembark: LogImpact is now LcpImpact; the old name goes with the next version"]
-        """)
-    assert "went on" in done.stdout, done.stderr

@@ -201,14 +201,8 @@ def test_one_clear_line(wrong, message):
     assert "\n" not in str(error.value)
 
 
-def test_the_former_name_of_the_contact_point_works_and_says_so():
-    logs = ImpactSystem(50.0, 0.1, [(0.0, 0.0), (0.2, 0.0)], [(1.0, 0.0), (0.0, 0.0)])
-    (ended,) = logs.run(0.02, 1e-5).impacts
-    with pytest.warns(FutureWarning, match=r"Impact\.place is now Impact\.point"):
-        assert ended.place == ended.point
+def test_the_point_of_contact_lies_between_the_logs():
     logs = ImpactSystem(50.0, 0.1, [(0.0, 0.0), (0.2, 0.0)])
     logs.run(1e-5, 1e-5)
     (contact,) = logs.contacts()
     assert contact["point"] == pytest.approx([0.1, 0.0, 0.0])
-    with pytest.warns(FutureWarning, match="'place' is now 'point'"):
-        assert contact["place"] is contact["point"]

@@ -230,8 +230,6 @@ def test_rules_that_stall_fall_back():
     q = np.array(CYCLE_Q)
     result = solve_lcp(M, q, method="block", start=CYCLE_START)
     assert result.used_fallback
-    with pytest.warns(DeprecationWarning, match=r"LcpResult\.guarded is now LcpResult\.used_fallback"):
-        assert result.guarded
     assert result.block_steps > 0
     check(M, q, result)
     np.testing.assert_allclose(result.z, enumerated(M, q), atol=1e-10)
