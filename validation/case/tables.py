@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields
+from functools import cache
 from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
@@ -35,6 +36,12 @@ def wanted(types: Types) -> str:
     """What is expected where `types` are: `a text or a list [...]`."""
     kinds = types if isinstance(types, tuple) else (types,)
     return " or ".join(_WORDS[kind] for kind in kinds if not (kind is int and float in kinds))
+
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    """The types of a record's fields; a case has hundreds of records."""
+    return get_type_hints(kind)
 
 
 class TableReader:
@@ -137,7 +144,7 @@ class TableReader:
         """The dataclass `kind` from the table `data`: keys are the fields that are not `given`, their types those of the fields, and a key
         is required where the field has no default. Texts lose the space around them."""
         own: list[Any] = [one for one in fields(kind) if one.name not in given]  # type: ignore[arg-type]
-        hints = get_type_hints(kind)
+        hints = _hints(kind)
         self.table(data, table, {one.name: _types(hints[one.name]) for one in own}, [one.name for one in own if one.default is MISSING])
         self.texts(data, table, [one.name for one in own if get_origin(hints[one.name]) is tuple])
         plain = {key: tuple(value) if isinstance(value, list) else value.strip() if isinstance(value, str) else value
