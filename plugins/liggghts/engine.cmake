@@ -35,10 +35,17 @@ foreach(kind style models)
     message(FATAL_ERROR "LIGGGHTS's Make.sh ${kind} failed: ${said}")
   endif()
 endforeach()
+# Headers of the tree include the lists of contact models: next to them, these would be found before the lists of our program.
+set(models ${CMAKE_CURRENT_BINARY_DIR}/engine_lists)
+file(MAKE_DIRECTORY ${models})
+foreach(kind surface normal tangential cohesion rolling)
+  file(COPY_FILE ${LIGGGHTS_INCLUDE_DIR}/style_${kind}_model.h ${models}/style_${kind}_model.h ONLY_IF_DIFFERENT)
+  file(REMOVE ${LIGGGHTS_INCLUDE_DIR}/style_${kind}_model.h)
+endforeach()
 
 file(GLOB engine ${LIGGGHTS_INCLUDE_DIR}/*.cpp)
 add_library(liggghts SHARED ${engine})
-target_include_directories(liggghts PRIVATE ${LIGGGHTS_INCLUDE_DIR})
+target_include_directories(liggghts PRIVATE ${LIGGGHTS_INCLUDE_DIR} ${models})
 target_link_libraries(liggghts PRIVATE MPI::MPI_CXX)
 # Its own options; the code is not ours to warn about.
 target_compile_options(liggghts PRIVATE -O2 -funroll-loops -fstrict-aliasing -w)

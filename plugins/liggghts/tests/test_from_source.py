@@ -17,6 +17,7 @@ SHA256 = "c18721d9a870c5170f03b91e4f1ffe13335c66ed1f0ff2c64ebd3be91c37867a"
 # As published: no C++17.
 NUMBERS = "  return static_cast< std::ostringstream & >(( std::ostringstream() << std::dec << a ) ).str();\n"
 COUNT = "  if (neighbor->lists[m]->numneigh > 0) {\n  if (neighbor->lists[m]->inum > 0)\n"
+MAKE = "for kind in surface normal tangential cohesion rolling; do echo '// the tree alone' > style_${kind}_model.h; done\n"
 
 
 def configure(build: Path, source: Path) -> subprocess.CompletedProcess[str]:
@@ -27,7 +28,7 @@ def configure(build: Path, source: Path) -> subprocess.CompletedProcess[str]:
 def stand_in(folder: Path, version: str = "3.8.0") -> Path:
     """A folder that looks like a LIGGGHTS source tree."""
     folder.mkdir(parents=True)
-    for name, text in {"utils.h": NUMBERS, "finish.cpp": COUNT, "finish.h": "", "Make.sh": "exit 0\n", "main.cpp": "",
+    for name, text in {"utils.h": NUMBERS, "finish.cpp": COUNT, "finish.h": "", "Make.sh": MAKE, "main.cpp": "",
                        "version_liggghts.txt": f"{version}\n", "cohesion_model_sjkr.h": "COHESION_MODEL(COHESION_SJKR,sjkr,1)\n"}.items():
         (folder / name).write_text(text)
     return folder
@@ -43,11 +44,13 @@ def test_a_source_tree_is_mended_in_a_copy(tmp_path):
         assert (engine / "utils.h").read_text() == "  return std::to_string(a);\n"
         assert (engine / "finish.cpp").read_text() == COUNT.replace(" > 0) {", ") {")
         assert not (engine / "main.cpp").exists()
-        times = {path: path.stat().st_mtime_ns for path in engine.iterdir()}
+        times = {path: path.stat().st_mtime_ns for path in [*engine.iterdir(), *engine.with_name("engine_lists").iterdir()]}
     assert configure(tmp_path / "build", source).returncode == 0
-    assert {path: path.stat().st_mtime_ns for path in engine.iterdir()} == times
+    assert {path: path.stat().st_mtime_ns for path in times} == times
     assert {path.name: path.read_bytes() for path in source.iterdir()} == before
-    # A model of the tree is known to our program, too.
+    # Our program has its own lists of models. Headers of the tree must not find another one next to them.
+    assert not list(engine.glob("style_*_model.h"))
+    assert (tmp_path / "build/plugins/liggghts/engine_lists/style_cohesion_model.h").read_text() == "// the tree alone\n"
     assert '#include "cohesion_model_sjkr.h"' in (tmp_path / "build/plugins/liggghts/lists/style_cohesion_model.h").read_text()
 
 
