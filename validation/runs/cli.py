@@ -30,6 +30,8 @@ Cores = Annotated[int | None, typer.Option(min=1, help="Cores of this machine to
 Jobs = Annotated[int | None, typer.Option(min=1, help="Runs of an array at the same time; default: the value in the site's file.")]
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign; default: results/campaigns/<name>.")]
 Dry = Annotated[bool, typer.Option("--dry-run", help="Check the file and show the runs and their cost, without running them.")]
+WriteOnly = Annotated[bool, typer.Option("--write-only", help="Write the job scripts, and a script that submits them, but do not "
+                                         "submit: for a container, where the scheduler's commands are missing.")]
 
 app = typer.Typer()
 
@@ -47,23 +49,23 @@ def show_campaigns() -> None:
 
 @app.command()
 def submit(campaign: File, dry_run: Dry = False, executor: Executor = None, out: Out = None, cores: Cores = None,
-           jobs: Jobs = None) -> None:
+           jobs: Jobs = None, write_only: WriteOnly = False) -> None:
     """Run a campaign here, or submit it to a cluster. It makes all runs, their measurements and the report; what is finished is kept."""
     file, chosen = locate(campaign), folder.choose(executor or "local", cores, jobs)
     where = _site(chosen)
     plan = expand.campaign(read(file))
     target = (out or Path("results") / "campaigns" / plan.label).resolve()
     if not dry_run:
-        _submit(plan, file, target, chosen, where)
+        _submit(plan, file, target, chosen, where, write_only)
         return
     folder.refuse_foreign(target, plan.label)
-    _check(chosen, plan, where)
+    _check(chosen, plan, where, write_only)
     found = estimate.estimates(plan, estimate.Rates(target))
     estimate.dry_run(show.console(), plan, found, target, None if where else _cores(chosen))
 
 
 @app.command()
-def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jobs: Jobs = None) -> None:
+def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jobs: Jobs = None, write_only: WriteOnly = False) -> None:
     """Continue a campaign that was stopped. It uses the options of the submission unless others are given."""
     target = directory.resolve()
     file = folder.own_file(target)
@@ -72,7 +74,7 @@ def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jo
     same = executor in (None, before.executor)
     chosen = folder.choose(executor or before.executor, cores or before.cores, jobs or (before.jobs if same else None))
     where = _site(chosen)
-    _submit(expand.campaign(read(file)), file, target, chosen, where)
+    _submit(expand.campaign(read(file)), file, target, chosen, where, write_only)
 
 
 def _site(chosen: Options) -> site.Site | None:
@@ -88,11 +90,14 @@ def _cores(chosen: Options) -> int:
     return chosen.cores or cores_here()
 
 
-def _check(chosen: Options, plan: Plan, where: site.Site | None) -> None:
+def _check(chosen: Options, plan: Plan, where: site.Site | None, write_only: bool = False) -> None:
     """DembarkError for runs with more cores or memory than this machine has, or that the scheduler would refuse."""
     if where:
-        cluster.check(plan, where)
+        if not write_only:
+            cluster.check(plan, where)
         return
+    if write_only:
+        raise DembarkError("--write-only is for a cluster", "with --executor local", "name a site with --executor")
     if chosen.jobs is not None:
         raise DembarkError("--jobs is for a cluster", "with --executor local", "use --cores for the runs of this machine")
     for place, used in plan.resources.items():
@@ -108,16 +113,16 @@ def _memory() -> float:
     return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
 
 
-def _submit(plan: Plan, file: Path, target: Path, chosen: Options, where: site.Site | None) -> None:
+def _submit(plan: Plan, file: Path, target: Path, chosen: Options, where: site.Site | None, write_only: bool) -> None:
     """Run or submit `plan`, that of the campaign `file`, in the folder `target`; refused while another process does."""
     cancel = None if where else workflow.cancelled_by_signal()
     folder.refuse_foreign(target, plan.label)
-    _check(chosen, plan, where)
+    _check(chosen, plan, where, write_only)
     with lock(target / workflow.LOCK, f"the campaign in {target} is being run by another process"):
         expected = {one.series.place: one.wall_time for one in estimate.estimates(plan, estimate.Rates(target))}
         folder.enter(target, file, plan, chosen, expected)
         if where:
-            lines = cluster.submit(plan, target, where, chosen.jobs)
+            lines = cluster.submit(plan, target, where, chosen.jobs, write_only)
         elif cancel:
             outcome = workflow.perform(plan, target, cancel, _cores(chosen), _memory(), target / folder.LOG, expected)
     if where:

@@ -30,17 +30,44 @@ from .site import Site
 JOBS = ".jobs"
 
 
-def submit(plan: Plan, folder: Path, site: Site, at_a_time: int | None = None) -> list[str]:
+class Later:
+    """Stands for the scheduler: keeps the job scripts for one that submits them elsewhere. Numbers of jobs are not known before."""
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+        self._scripts: list[Path] = []
+
+    def send(self, script: Path) -> str:
+        """A word for the number of this job."""
+        self._scripts.append(script)
+        return f"@{script.stem}@"
+
+    def write(self, path: Path) -> None:
+        """The script: it submits all jobs in their order, and puts the numbers of earlier ones into those that wait for them."""
+        lines = ["#!/bin/bash", "# Submits the jobs of a campaign. Run it where the commands of the scheduler are.", "set -eu -o pipefail",
+                 f"cd {shlex.quote(str(path.parent))}", 'sent() {  # sent NAME ANSWER', '  number=${2%%[[:space:];]*}',
+                 '  [ -n "$number" ] || { echo "the scheduler gave no number for $1; submit the rest with \'dembark resume\'" >&2; exit 1; }',
+                 f'  sed -i "s/@$1@/$number/g" {shlex.quote(path.stem)}-*.sh', '  echo "$1: job $number"', '}']
+        lines += [f"sent {shlex.quote(script.stem)} \"$({self._site.submit.format(script=shlex.quote(str(script)))})\""
+                  for script in self._scripts]
+        # Submitted once.
+        lines += [f"mv {shlex.quote(path.name)} {shlex.quote(path.name)}.done", ""]
+        write_atomic(path, "\n".join(lines).encode())
+        path.chmod(0o755)
+
+
+def submit(plan: Plan, folder: Path, site: Site, at_a_time: int | None = None, write_only: bool = False) -> list[str]:
     """Submit the runs of `plan` in its results folder that are neither finished nor running, retries of those that run, and the job that
-    reports; returns lines for people. DembarkError with the scheduler's own words when it refuses a job; it names those submitted
-    before."""
+    reports; returns lines for people. With `write_only` a script is written that submits them. DembarkError with the scheduler's own words
+    when it refuses a job; it names those submitted before."""
     states = {state.folder: state.state for state in results.states(folder)}
     arrays: dict[tuple[Resources, bool], list[str]] = {}
     for place in plan.folders:
         if states.get(place) != "finished":
             used = replace(plan.resources[Path(place).parent], restart_interval=None)
             arrays.setdefault((used, states.get(place) == "running"), []).append(place)
-    stamp = _stamp(plan.label, folder / JOBS)
+    stamp, later = _stamp(plan.label, folder / JOBS), Later(site)
+    send = later.send if write_only else site.send
     sent: list[tuple[str, str]] = []
     earlier = [(job, script.stem) for script in sorted((folder / JOBS).glob("*.sh")) for job in site.waiting(script.stem)]
     last = list(earlier)
@@ -51,16 +78,22 @@ def submit(plan: Plan, folder: Path, site: Site, at_a_time: int | None = None) -
                 chunk, after = places[first:first + site.largest_array], earlier if running else []
                 for attempt in range(int(running), 1 + plan.retries):
                     name = f"{stamp}-{len(sent) + 1}"
-                    after = [(_send(folder, site, name, used, chunk, after, attempt > 0, at_a_time), name)]
+                    script = _write(folder, site, name, used, chunk, after, attempt > 0, at_a_time)
+                    after = [(send(script), name)]
                     sent += after
                 last += [one for one in after if one not in last]
         name = f"{stamp}-{REPORT}"
-        sent.append((_send(folder, site, name, plan.measure, [REPORT], last, False, None), name))
+        sent.append((send(_write(folder, site, name, plan.measure, [REPORT], last, False, None)), name))
     except DembarkError as error:
         before = ", ".join(job for job, _ in sent)
         raise DembarkError(str(error), f"submitted before: {before}" if before else "nothing was submitted") from None
     count = sum(len(places) for (_, running), places in arrays.items() if not running)
-    return [f"submitted {count} runs in {len(sent)} jobs: {' '.join(job for job, _ in sent)}",
+    if write_only:
+        later.write(script := folder / JOBS / f"{stamp}.submit")
+        done = f"{count} runs in {len(sent)} jobs are ready; to submit them, run: bash {shlex.quote(str(script))}"
+    else:
+        done = f"submitted {count} runs in {len(sent)} jobs: {' '.join(job for job, _ in sent)}"
+    return [done,
             f"{len(plan.folders) - count} of {len(plan.folders)} runs are finished or running"]
 
 
@@ -78,7 +111,7 @@ def check(plan: Plan, site: Site) -> None:
     if site.submit.split()[0] != "sbatch":
         return
     if not shutil.which("sbatch"):
-        raise DembarkError("sbatch not found", "on PATH", "start this on a machine that jobs are submitted from")
+        raise DembarkError("sbatch not found", "on PATH", "start this on a machine that jobs are submitted from, or add --write-only")
     for used in {replace(used, restart_interval=None): None for used in (*plan.resources.values(), plan.measure)}:
         with tempfile.TemporaryDirectory(prefix="dembark-") as folder:
             script = Path(folder, "job.sh")
@@ -88,16 +121,16 @@ def check(plan: Plan, site: Site) -> None:
                                    f"see the campaign's resources, and the header and defaults of {site.path}")
 
 
-def _send(folder: Path, site: Site, name: str, used: Resources, places: list[str], after: list[tuple[str, str]], again: bool,
-          at_a_time: int | None) -> str:
+def _write(folder: Path, site: Site, name: str, used: Resources, places: list[str], after: list[tuple[str, str]], again: bool,
+           at_a_time: int | None) -> Path:
     jobs = folder / JOBS
     jobs.mkdir(exist_ok=True)
     elements, script = jobs / f"{name}.runs", jobs / f"{name}.sh"
     write_atomic(elements, "".join(f"{place}\n" for place in places).encode())
     words = [sys.executable, "-m", "dembark.validation.runs.job", str(folder), str(elements), *(["--again"] if again else [])]
-    # Sites may start jobs without the environment of the submitter.
-    body = "".join(f"export {key}={shlex.quote(value)}\n" for key, value in environment().items())
-    body += f'exec {shlex.join(words)} --cores {used.cores} "{site.index}"'
+    # Sites may start jobs, and containers programs, without the environment of the submitter.
+    settings = shlex.join(["env", *(f"{key}={value}" for key, value in environment().items())])
+    body = f'exec {site.container} {settings} {shlex.join(words)} --cores {used.cores} "{site.index}"'
     write_atomic(script, site.script(name, jobs / f"{name}.log", used, len(places), after, body, at_a_time).encode())
     script.chmod(0o755)
-    return site.send(script)
+    return script

@@ -17,7 +17,7 @@ from dembark.validation.case.tables import TableReader, Types, load_toml
 
 SHIPPED = Path(__file__).with_name("sites")
 _KEYS: dict[str, Types] = {"submit": str, "header": str, "array": str, "index": str, "after": str, "each": str, "join": str, "memory": str,
-                           "time": str, "at_a_time": int, "largest_array": int, "preamble": str, "queued": str}
+                           "time": str, "at_a_time": int, "largest_array": int, "preamble": str, "queued": str, "container": str}
 _NEEDED = ("submit", "header", "array", "index", "after")
 # The words in braces of each key.
 _JOB = ("name", "log", "ranks", "threads", "cores", "memory_mb", "minutes", "seconds")
@@ -43,9 +43,13 @@ class Site:
     largest_array: int = 1000
     preamble: str = ""
     queued: str = ""
+    container: str = ""
 
     def environment(self) -> dict[str, str]:
-        """This process's environment after the preamble; DembarkError when that fails."""
+        """This process's environment after the preamble; DembarkError when that fails. A container starts after the preamble of each job,
+        and this process is in one: it has nothing to change here."""
+        if self.container:
+            return {}
         # What it prints must not get into the list of variables; one of comments alone needs a command.
         script = f"set -e\n{{ :\n{self.preamble}\n}} >&2\nenv -0"
         try:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import shutil
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -106,6 +108,50 @@ def test_a_run_that_runs_is_submitted_to_be_repeated(queue: Path, command: Comma
     assert len(again) == 2
     assert all("--again" in Path("results/.jobs", f"{job}.sh").read_text(encoding="utf-8") for job in again)
     assert {str(number) for number in range(2, before + 1)} <= awaited(again[0])
+
+
+def test_jobs_that_are_only_written_are_submitted_by_their_script(queue: Path, command: Command) -> None:
+    words = ["submit", "boxes.toml", "--executor", "site.toml", "--out", "results", "--write-only"]
+    code, _, said = command(*words)
+    (script,) = Path("results/.jobs").glob("*.submit")
+    assert code == 0 and f"bash {script.resolve()}" in said and queue.read_text(encoding="utf-8") == "of another user\n"
+    # The queue of this scheduler is in the folder that it is called from; numbers follow the name of a cluster as Slurm writes them.
+    text = script.read_text(encoding="utf-8")
+    script.write_text(text.replace("wc -l < queue", f"cd {queue.parent}; echo $(wc -l < queue)';cluster'"), encoding="utf-8")
+    done = subprocess.run(["bash", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    jobs = queue.read_text(encoding="utf-8").splitlines()[1:]
+    assert {f"{job}: job {number}" for number, job in enumerate(jobs, start=1)} == set(done.stdout.splitlines())
+    # Retries follow the attempt before, the report all of them, as in a direct submission.
+    assert awaited(jobs[1]) == {"1"} and awaited(jobs[-1]) >= {str(len(jobs) - 1)}
+    assert not any("@" in path.read_text(encoding="utf-8").splitlines()[2] for path in Path("results/.jobs").glob("*.sh"))
+    assert subprocess.run(["bash", script], capture_output=True, check=False).returncode != 0, "submitted twice"
+
+
+def test_a_script_that_gets_no_number_stops(queue: Path, command: Command) -> None:
+    Path("site.toml").write_text(SITE.replace('submit = "wc -l < queue;', 'submit = "false;').replace(">> queue", "> /dev/null"), encoding="utf-8")
+    assert command("submit", "boxes.toml", "--executor", "site.toml", "--out", "results", "--write-only") == (0, ANY, ANY)
+    (script,) = Path("results/.jobs").glob("*.submit")
+    done = subprocess.run(["bash", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and done.stderr.count("\n") == 1 and "gave no number" in done.stderr and script.exists()
+
+
+def test_write_only_needs_a_site(queue: Path, command: Command) -> None:
+    code, _, said = command("submit", "boxes.toml", "--out", "results", "--write-only")
+    assert code == 2 and "--write-only" in said and "--executor" in said and not Path("results").exists()
+
+
+def test_jobs_start_dembark_in_a_container(queue: Path, command: Command) -> None:
+    """The preamble is for the jobs, which start outside of it."""
+    Path("site.toml").write_text(SITE + """
+container = "enter /images/dembark.sif"
+preamble = "module load enter"
+""", encoding="utf-8")
+    assert command("submit", "boxes.toml", "--executor", "site.toml", "--out", "results") == (0, ANY, ANY)
+    for path in Path("results/.jobs").glob("*.sh"):
+        *_, preamble, body = path.read_text(encoding="utf-8").strip().splitlines()
+        assert preamble == "module load enter" and body.startswith("exec enter /images/dembark.sif env ")
+        assert f" {sys.executable} -m dembark.validation.runs.job " in body
 
 
 @pytest.fixture
