@@ -35,7 +35,8 @@ foreach(kind style models)
     message(FATAL_ERROR "LIGGGHTS's Make.sh ${kind} failed: ${said}")
   endif()
 endforeach()
-# Headers of the tree include the lists of contact models: next to them, these would be found before the lists of our program.
+# Headers of the tree include the lists of contact models. A list in the folder of these headers would be found first, before that of our
+# program: the tree's own lists get a folder of their own.
 set(models ${CMAKE_CURRENT_BINARY_DIR}/engine_lists)
 file(MAKE_DIRECTORY ${models})
 foreach(kind surface normal tangential cohesion rolling)

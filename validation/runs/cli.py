@@ -30,8 +30,8 @@ Cores = Annotated[int | None, typer.Option(min=1, help="Cores of this machine to
 Jobs = Annotated[int | None, typer.Option(min=1, help="Runs of an array at the same time; default: the value in the site's file.")]
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign; default: results/campaigns/<name>.")]
 Dry = Annotated[bool, typer.Option("--dry-run", help="Check the file and show the runs and their cost, without running them.")]
-WriteOnly = Annotated[bool, typer.Option("--write-only", help="Write the job scripts, and a script that submits them, but do not "
-                                         "submit: for a container, where the scheduler's commands are missing.")]
+WriteOnly = Annotated[bool, typer.Option("--write-only", help="Write the job scripts, and a script that submits them, but do not submit. "
+                                         "For a container, where the scheduler's commands are missing; it cannot be asked about resources.")]
 
 app = typer.Typer()
 
@@ -66,7 +66,7 @@ def submit(campaign: File, dry_run: Dry = False, executor: Executor = None, out:
 
 @app.command()
 def resume(directory: Folder, executor: Executor = None, cores: Cores = None, jobs: Jobs = None, write_only: WriteOnly = False) -> None:
-    """Continue a campaign that was stopped. It uses the options of the submission unless others are given."""
+    """Continue a campaign that was stopped. It uses the executor, cores and jobs of the submission unless others are given."""
     target = directory.resolve()
     file = folder.own_file(target)
     folder.restore(target)

@@ -13,6 +13,7 @@ import shutil
 import sys
 import tempfile
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -30,8 +31,29 @@ from .site import Site
 JOBS = ".jobs"
 
 
+# `sent NAME COMMAND` submits a job, keeps its number and writes it into the scripts of the jobs that wait for it.
+_SENT = r"""
+exec 9> {stamp}.lock
+flock -n 9 || {{ echo "this script is running already" >&2; exit 1; }}
+sent() {{
+  if [ ! -s "$1.job" ]; then
+    answer=$(bash -c "$2" < /dev/null) && read -r number _ <<< "$answer" && [ -n "$number" ] || {{
+      echo "the scheduler refused $1: $answer; correct $PWD/$1.sh, and run this script again" >&2; exit 1; }}
+    echo "${{number%%;*}}" > "$1.job"
+    echo "submitted $1: $answer"
+  fi
+  sed -i "s/@$1@/$(cat "$1.job")/g" {stamp}-*.sh
+}}
+# `ended NAME COMMAND` stops when a job of an earlier submission waits or runs.
+ended() {{
+  waiting=$(bash -c "$2" < /dev/null)
+  [ -z "$waiting" ] || {{ echo "$1 of an earlier submission waits or runs: wait for its end, or cancel it: $waiting" >&2; exit 1; }}
+}}
+"""
+
+
 class Later:
-    """Stands for the scheduler: keeps the job scripts for one that submits them elsewhere. Numbers of jobs are not known before."""
+    """Keeps job scripts for a script that submits them elsewhere, where the scheduler is. A job has a word for its number until then."""
 
     def __init__(self, site: Site) -> None:
         self._site = site
@@ -42,17 +64,14 @@ class Later:
         self._scripts.append(script)
         return f"@{script.stem}@"
 
-    def write(self, path: Path) -> None:
-        """The script: it submits all jobs in their order, and puts the numbers of earlier ones into those that wait for them."""
-        lines = ["#!/bin/bash", "# Submits the jobs of a campaign. Run it where the commands of the scheduler are.", "set -eu -o pipefail",
-                 f"cd {shlex.quote(str(path.parent))}", 'sent() {  # sent NAME ANSWER', '  number=${2%%[[:space:];]*}',
-                 '  [ -n "$number" ] || { echo "the scheduler gave no number for $1; submit the rest with \'dembark resume\'" >&2; exit 1; }',
-                 f'  sed -i "s/@$1@/$number/g" {shlex.quote(path.stem)}-*.sh', '  echo "$1: job $number"', '}']
-        lines += [f"sent {shlex.quote(script.stem)} \"$({self._site.submit.format(script=shlex.quote(str(script)))})\""
-                  for script in self._scripts]
-        # Submitted once.
-        lines += [f"mv {shlex.quote(path.name)} {shlex.quote(path.name)}.done", ""]
-        write_atomic(path, "\n".join(lines).encode())
+    def write(self, path: Path, earlier: Iterable[str]) -> None:
+        """The script: it submits all jobs in their order, each once, when none of the jobs called `earlier` waits or runs."""
+        lines = ["#!/bin/bash", "# Submits the jobs of a campaign. Run it where the commands of the scheduler are.", self._site.preamble.strip(),
+                 f"cd {shlex.quote(str(path.parent))} || exit 1", _SENT.format(stamp=path.stem).strip()]
+        if self._site.queued:
+            lines += [shlex.join(["ended", name, self._site.queued.format(name=shlex.quote(name))]) for name in earlier]
+        lines += [shlex.join(["sent", script.stem, self._site.submit.format(script=shlex.quote(str(script)))]) for script in self._scripts]
+        write_atomic(path, "\n".join([*lines, ""]).encode())
         path.chmod(0o755)
 
 
@@ -69,7 +88,8 @@ def submit(plan: Plan, folder: Path, site: Site, at_a_time: int | None = None, w
     stamp, later = _stamp(plan.label, folder / JOBS), Later(site)
     send = later.send if write_only else site.send
     sent: list[tuple[str, str]] = []
-    earlier = [(job, script.stem) for script in sorted((folder / JOBS).glob("*.sh")) for job in site.waiting(script.stem)]
+    before = [script.stem for script in sorted((folder / JOBS).glob("*.sh"))]
+    earlier = [] if write_only else [(job, name) for name in before for job in site.waiting(name)]
     last = list(earlier)
     try:
         for (used, running), places in arrays.items():
@@ -85,11 +105,11 @@ def submit(plan: Plan, folder: Path, site: Site, at_a_time: int | None = None, w
         name = f"{stamp}-{REPORT}"
         sent.append((send(_write(folder, site, name, plan.measure, [REPORT], last, False, None)), name))
     except DembarkError as error:
-        before = ", ".join(job for job, _ in sent)
-        raise DembarkError(str(error), f"submitted before: {before}" if before else "nothing was submitted") from None
+        numbers = ", ".join(job for job, _ in sent)
+        raise DembarkError(str(error), f"submitted before: {numbers}" if numbers else "nothing was submitted") from None
     count = sum(len(places) for (_, running), places in arrays.items() if not running)
     if write_only:
-        later.write(script := folder / JOBS / f"{stamp}.submit")
+        later.write(script := folder / JOBS / f"{stamp}.submit", before)
         done = f"{count} runs in {len(sent)} jobs are ready; to submit them, run: bash {shlex.quote(str(script))}"
     else:
         done = f"submitted {count} runs in {len(sent)} jobs: {' '.join(job for job, _ in sent)}"
@@ -130,7 +150,7 @@ def _write(folder: Path, site: Site, name: str, used: Resources, places: list[st
     words = [sys.executable, "-m", "dembark.validation.runs.job", str(folder), str(elements), *(["--again"] if again else [])]
     # Sites may start jobs, and containers programs, without the environment of the submitter.
     settings = shlex.join(["env", *(f"{key}={value}" for key, value in environment().items())])
-    body = f'exec {site.container} {settings} {shlex.join(words)} --cores {used.cores} "{site.index}"'
+    body = f'exec {site.container.strip()} {settings} {shlex.join(words)} --cores {used.cores} "{site.index}"'
     write_atomic(script, site.script(name, jobs / f"{name}.log", used, len(places), after, body, at_a_time).encode())
     script.chmod(0o755)
     return script

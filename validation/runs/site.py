@@ -128,6 +128,8 @@ def read(path: Path) -> Site:
         for word in re.findall(r"\{(\w*)\}", value) if key in _WORDS else ():
             if word not in _WORDS[key]:
                 raise reader.fail("top level", f"{{{word}}} in {key} is not known", nearest(word, _WORDS[key]))
+    if "\n" in data.get("container", "").strip():
+        raise reader.fail("top level", "container has several lines", "it is the beginning of one command", "container")
     for key in ("at_a_time", "largest_array"):
         if data.get(key, 1) < 1:
             raise reader.fail("top level", f"{key} = {data[key]} is out of range", "it must be >= 1")

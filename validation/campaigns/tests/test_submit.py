@@ -79,8 +79,8 @@ def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "queue"
 
 
-def awaited(job: str) -> set[str]:
-    (after,) = re.findall(r"^# after (.*)$", Path("results/.jobs", f"{job}.sh").read_text(encoding="utf-8"), re.MULTILINE)
+def awaited(job: str, results: str = "results") -> set[str]:
+    (after,) = re.findall(r"^# after (.*)$", Path(results, ".jobs", f"{job}.sh").read_text(encoding="utf-8"), re.MULTILINE)
     return set(after.split(":"))
 
 
@@ -110,30 +110,61 @@ def test_a_run_that_runs_is_submitted_to_be_repeated(queue: Path, command: Comma
     assert {str(number) for number in range(2, before + 1)} <= awaited(again[0])
 
 
-def test_jobs_that_are_only_written_are_submitted_by_their_script(queue: Path, command: Command) -> None:
-    words = ["submit", "boxes.toml", "--executor", "site.toml", "--out", "results", "--write-only"]
-    code, _, said = command(*words)
-    (script,) = Path("results/.jobs").glob("*.submit")
-    assert code == 0 and f"bash {script.resolve()}" in said and queue.read_text(encoding="utf-8") == "of another user\n"
-    # The queue of this scheduler is in the folder that it is called from; numbers follow the name of a cluster as Slurm writes them.
-    text = script.read_text(encoding="utf-8")
-    script.write_text(text.replace("wc -l < queue", f"cd {queue.parent}; echo $(wc -l < queue)';cluster'"), encoding="utf-8")
-    done = subprocess.run(["bash", script], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    jobs = queue.read_text(encoding="utf-8").splitlines()[1:]
-    assert {f"{job}: job {number}" for number, job in enumerate(jobs, start=1)} == set(done.stdout.splitlines())
-    # Retries follow the attempt before, the report all of them, as in a direct submission.
-    assert awaited(jobs[1]) == {"1"} and awaited(jobs[-1]) >= {str(len(jobs) - 1)}
-    assert not any("@" in path.read_text(encoding="utf-8").splitlines()[2] for path in Path("results/.jobs").glob("*.sh"))
-    assert subprocess.run(["bash", script], capture_output=True, check=False).returncode != 0, "submitted twice"
+ELSEWHERE = ["--executor", "site.toml", "--out", "my results", "--write-only"]
 
 
-def test_a_script_that_gets_no_number_stops(queue: Path, command: Command) -> None:
-    Path("site.toml").write_text(SITE.replace('submit = "wc -l < queue;', 'submit = "false;').replace(">> queue", "> /dev/null"), encoding="utf-8")
-    assert command("submit", "boxes.toml", "--executor", "site.toml", "--out", "results", "--write-only") == (0, ANY, ANY)
-    (script,) = Path("results/.jobs").glob("*.submit")
-    done = subprocess.run(["bash", script], capture_output=True, text=True, check=False)
-    assert done.returncode == 1 and done.stderr.count("\n") == 1 and "gave no number" in done.stderr and script.exists()
+def submitted_elsewhere() -> subprocess.CompletedProcess[str]:
+    """What the newest script that submits the jobs says; it starts in another folder."""
+    *_, script = sorted(Path("my results/.jobs").glob("*.submit"), key=lambda path: path.stat().st_mtime_ns)
+    return subprocess.run(["bash", script.resolve()], cwd="/", capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def elsewhere(queue: Path) -> Path:
+    """The same scheduler for scripts that start elsewhere. It answers as Slurm does with a name of a cluster, and refuses while there is a
+    file `full`."""
+    text = SITE.replace("submit = \"", f"submit = \"cd {queue.parent}; [ ! -e full ] || exit 1; ").replace("wc -l < queue", "echo $(wc -l < queue)';cluster'")
+    Path("site.toml").write_text(text.replace("grep -x", f"cd {queue.parent}; grep -x"), encoding="utf-8")
+    return queue
+
+
+def test_jobs_that_are_only_written_are_submitted_by_their_script(elsewhere: Path, command: Command) -> None:
+    code, _, said = command("submit", "boxes.toml", *ELSEWHERE)
+    (script,) = Path("my results/.jobs").glob("*.submit")
+    assert code == 0 and f"bash '{script.resolve()}'" in said and elsewhere.read_text(encoding="utf-8") == "of another user\n"
+    for _ in range(2):  # the second time there is nothing left to submit
+        done = submitted_elsewhere()
+        assert done.returncode == 0, done.stderr
+    jobs = elsewhere.read_text(encoding="utf-8").splitlines()[1:]
+    assert len(jobs) == len(set(jobs)) == len(list(Path("my results/.jobs").glob("*.sh")))
+    # As in a direct submission: retries follow the attempt before, the report all of them.
+    waits = {number: awaited(job, "my results") for number, job in enumerate(jobs, start=1)
+             if "# after" in Path("my results/.jobs", f"{job}.sh").read_text(encoding="utf-8")}
+    *attempts, report = range(1, len(jobs) + 1)
+    repeated = [waits[one] for one in attempts if one in waits]
+    assert {"1"} in repeated and {"2"} in repeated and waits[report] == {str(one) for one in attempts if {str(one)} not in repeated}
+
+
+def test_a_script_whose_job_is_refused_goes_on_where_it_stopped(elsewhere: Path, command: Command) -> None:
+    assert command("submit", "boxes.toml", *ELSEWHERE) == (0, ANY, ANY)
+    Path("full").touch()
+    done = submitted_elsewhere()
+    assert done.returncode == 1 and done.stderr.count("\n") == 1 and "refused" in done.stderr and "-1.sh" in done.stderr
+    Path("full").unlink()
+    assert submitted_elsewhere().returncode == 0
+    jobs = elsewhere.read_text(encoding="utf-8").splitlines()[1:]
+    assert len(jobs) == len(set(jobs)) == len(list(Path("my results/.jobs").glob("*.sh")))
+
+
+def test_what_is_resumed_elsewhere_waits_for_the_jobs_of_before(elsewhere: Path, command: Command) -> None:
+    assert command("submit", "boxes.toml", *ELSEWHERE) == (0, ANY, ANY)
+    assert submitted_elsewhere().returncode == 0
+    before = elsewhere.read_text(encoding="utf-8")
+    assert command("resume", "my results", "--write-only") == (0, ANY, ANY)
+    done = submitted_elsewhere()
+    assert done.returncode == 1 and "of an earlier submission" in done.stderr and elsewhere.read_text(encoding="utf-8") == before
+    elsewhere.write_text("of another user\n", encoding="utf-8")
+    assert submitted_elsewhere().returncode == 0
 
 
 def test_write_only_needs_a_site(queue: Path, command: Command) -> None:
