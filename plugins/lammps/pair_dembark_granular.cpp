@@ -187,10 +187,10 @@ double PairDembarkGranular::largest_radius() const { return *std::max_element(la
 double PairDembarkGranular::init_one(int i, int j) {
   if (!setflag[i][j]) coefficients_.fail("pair_coeff " + std::to_string(i) + " " + std::to_string(j) + " is missing");
   coefficients_.complete(i, j);
-  // No bridge is longer than the skin, and what lists pairs looks no further than this.
-  const double reach = coefficients_.holds() ? neighbor->skin : 0.0;
-  return largest_radius_[std::size_t(i)] + largest_radius_[std::size_t(j)] + reach;
+  return largest_radius_[std::size_t(i)] + largest_radius_[std::size_t(j)] + reach();
 }
+
+double PairDembarkGranular::reach() const { return coefficients_.holds() ? neighbor->skin : 0.0; }
 
 void PairDembarkGranular::transfer_history(double* from, double* to, int, int) { layout_.swap_bodies(from, to); }
 

@@ -28,6 +28,10 @@ class PairDembarkGranular : public Pair, dembark_family::PackedContacts {
   void coeff(int narg, char** arg) override;
   void init_style() override;
   double init_one(int i, int j) override;
+  /// m, of a grain and of two radii: for `neigh_modify collection/interval`. They override what Pair has before update 4 of 22 Jul 2025; later
+  /// LAMMPS asks for the radii alone.
+  double atom2cut(int i) { return 2.0 * atom->radius[i]; }
+  double radii2cut(double radius_i, double radius_j) { return radius_i + radius_j + reach(); }
   void compute(int eflag, int vflag) override;
   double single(int i, int j, int itype, int jtype, double rsq, double factor_coul, double factor_lj, double& fforce) override;
   void transfer_history(double* from, double* to, int, int) override;
@@ -75,6 +79,8 @@ class PairDembarkGranular : public Pair, dembark_family::PackedContacts {
   const dembark::ContactParameters& law(int type_i, int type_j) const override { return coefficients_(type_i, type_j); }
   void advance_packs();
   void tally(int i, int j, const dembark::ContactBodies& bodies, const dembark::ContactForce& out);
+  /// m, between surfaces: no bridge is longer than the skin, and what lists pairs looks no further than this.
+  double reach() const;
   const double* masses() const { return rigid_.empty() ? atom->rmass : masses_.data(); }
   void take_body_masses();
   void check_run();

@@ -53,7 +53,7 @@ def test_it_changes_no_bit(tmp_path, plain, name):
 SAME = {
     "neighbor multi": (1, lambda text: text.replace("neighbor 0.002 bin", "neighbor 0.002 multi")),
     "neighbor multi, intervals": (2, lambda text: text.replace(
-        "neighbor 0.002 bin", "neighbor 0.002 multi\nneigh_modify collection/interval 2 0.0024 0.006\ncomm_modify mode multi")),
+        "neighbor 0.002 bin", "neighbor 0.002 multi\nneigh_modify collection/interval 2 0.005 0.006\ncomm_modify mode multi")),
     "balance rcb": (3, lambda text: text.replace("\nrun", "\ncomm_style tiled\nfix balance all balance 100 1.0 rcb\nrun")),
     "balance shift": (4, lambda text: text.replace("\nrun", "\nfix balance all balance 100 1.0 shift xyz 5 1.1\nrun")),
 }
