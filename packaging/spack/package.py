@@ -4,8 +4,8 @@ Spack 1.0 or newer reads it from a repository of yours: `spack repo create`, the
 source is a checkout, because there is no archive of a release that a recipe could name:
 
     spack env activate --create dembark
-    spack add dembark@0.2.0 +lammps
-    spack develop --path /path/to/checkout dembark@0.2.0
+    spack add dembark@1.0.0 +lammps
+    spack develop --path /path/to/checkout dembark@1.0.0
     spack install
 
 The package is called `dembark` and not `py-dembark`: it installs programs, also of engines without Python. packaging/tests/test_recipes.py
@@ -26,7 +26,7 @@ class Dembark(PythonPackage):
     license_of("GPL-2.0-or-later")
 
     # Without a checksum: `spack develop` names the source.
-    version("0.2.0")
+    version("1.0.0")
 
     variant("fields", default=False, description="Fields in NetCDF, files for ParaView and pictures")
     variant("report", default=False, description="Figures and the report in HTML; report.pdf needs WeasyPrint, which is not part of Spack")

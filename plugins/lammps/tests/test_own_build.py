@@ -105,7 +105,7 @@ def test_an_installed_lammps_of_another_version_is_refused(tmp_path):
 
 def test_without_an_installed_lammps_one_line_says_so(tmp_path):
     done = configure(tmp_path / "build", LAMMPS_INSTALLED="ON", CMAKE_DISABLE_FIND_PACKAGE_LAMMPS="ON")
-    assert "install liblammps-dev of Debian 13, or set LAMMPS_DIR" in told(done)
+    assert "install lammps and liblammps-dev of Debian 13, or set LAMMPS_DIR" in told(done)
 
 
 WARNING = "dembark's tests have not run with LAMMPS"
