@@ -144,7 +144,7 @@ class TableReader:
         """The dataclass `kind` from the table `data`: keys are the fields that are not `given`, their types those of the fields, and a key
         is required where the field has no default. Texts lose the space around them."""
         own: list[Any] = [one for one in fields(kind) if one.name not in given]  # type: ignore[arg-type]
-        hints = _hints(kind)
+        hints = _hints(kind)  # type: ignore[arg-type]
         self.table(data, table, {one.name: _types(hints[one.name]) for one in own}, [one.name for one in own if one.default is MISSING])
         self.texts(data, table, [one.name for one in own if get_origin(hints[one.name]) is tuple])
         plain = {key: tuple(value) if isinstance(value, list) else value.strip() if isinstance(value, str) else value

@@ -31,7 +31,7 @@ Jobs = Annotated[int | None, typer.Option(min=1, help="Runs of an array at the s
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign; default: results/campaigns/<name>.")]
 Dry = Annotated[bool, typer.Option("--dry-run", help="Check the file and show the runs and their cost, without running them.")]
 WriteOnly = Annotated[bool, typer.Option("--write-only", help="Write the job scripts, and a script that submits them, but do not submit. "
-                                         "For a container, where the scheduler's commands are missing; it cannot be asked about resources.")]
+                                         "For a container, where the scheduler's commands are missing; it is not asked about resources.")]
 
 app = typer.Typer()
 

@@ -66,8 +66,8 @@ class Later:
 
     def write(self, path: Path, earlier: Iterable[str]) -> None:
         """The script: it submits all jobs in their order, each once, when none of the jobs called `earlier` waits or runs."""
-        lines = ["#!/bin/bash", "# Submits the jobs of a campaign. Run it where the commands of the scheduler are.", self._site.preamble.strip(),
-                 f"cd {shlex.quote(str(path.parent))} || exit 1", _SENT.format(stamp=path.stem).strip()]
+        lines = ["#!/bin/bash", "# Submits the jobs of a campaign. Run it where the commands of the scheduler are.",
+                 self._site.preamble.strip(), f"cd {shlex.quote(str(path.parent))} || exit 1", _SENT.format(stamp=path.stem).strip()]
         if self._site.queued:
             lines += [shlex.join(["ended", name, self._site.queued.format(name=shlex.quote(name))]) for name in earlier]
         lines += [shlex.join(["sent", script.stem, self._site.submit.format(script=shlex.quote(str(script)))]) for script in self._scripts]

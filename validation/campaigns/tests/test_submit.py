@@ -123,7 +123,8 @@ def submitted_elsewhere() -> subprocess.CompletedProcess[str]:
 def elsewhere(queue: Path) -> Path:
     """The same scheduler for scripts that start elsewhere. It answers as Slurm does with a name of a cluster, and refuses while there is a
     file `full`."""
-    text = SITE.replace("submit = \"", f"submit = \"cd {queue.parent}; [ ! -e full ] || exit 1; ").replace("wc -l < queue", "echo $(wc -l < queue)';cluster'")
+    text = SITE.replace("submit = \"", f"submit = \"cd {queue.parent}; [ ! -e full ] || exit 1; ")
+    text = text.replace("wc -l < queue", "echo $(wc -l < queue)';cluster'")
     Path("site.toml").write_text(text.replace("grep -x", f"cd {queue.parent}; grep -x"), encoding="utf-8")
     return queue
 

@@ -56,8 +56,9 @@ class Site:
         kept = {key: value for key, value in os.environ.items() if key.startswith(("PIP_", "SSL_", "HTTP", "http", "no_proxy"))}
         environment = kept | {"HOME": str(self.home), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8",
                               "SLURM_CONF": self.cluster.environment["SLURM_CONF"]}
-        done = subprocess.run(["setpriv", f"--reuid={NAME}", f"--regid={NAME}", "--clear-groups", *map(str, words)], cwd=self.home, env=environment,
-                              capture_output=True, text=True, timeout=seconds, check=False)
+        words = ("setpriv", f"--reuid={NAME}", f"--regid={NAME}", "--clear-groups", *words)
+        done = subprocess.run([str(word) for word in words], cwd=self.home, env=environment, capture_output=True, text=True,
+                              timeout=seconds, check=False)
         said = done.stdout + done.stderr
         assert done.returncode == 0, said[-3000:]
         return said
