@@ -114,7 +114,8 @@ def test_sources_are_this_checkout():
 
 
 def test_the_workflow_runs_ci_on_both_releases_of_debian():
-    (job,) = read_yaml(WORKFLOW)["jobs"].values()
+    jobs = read_yaml(WORKFLOW)["jobs"]
+    job = jobs.pop("check")
     assert job["container"] == "debian:${{ matrix.debian }}" and job["strategy"]["matrix"]["debian"] == ["bookworm", "trixie"]
     assert job["timeout-minutes"] == 120
     steps = [one.get("run", one.get("uses", "")) for one in job["steps"]]
@@ -123,6 +124,9 @@ def test_the_workflow_runs_ci_on_both_releases_of_debian():
     assert tools < checkout < steps.index(".ci/run")
     (kept,) = [one for one in job["steps"] if "upload-artifact" in one.get("uses", "")]
     assert kept["if"] == "always()"
+    made = {one["run"].split()[1] for other in jobs.values() for one in other["steps"] if one.get("run", "").startswith("make ")}
+    assert made == {"test-full", "container"}
+    assert made <= set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
 
 
 def pattern(glob: str) -> re.Pattern[str]:
