@@ -98,6 +98,11 @@ def largest(p: Parameters) -> float:
     return float(p.grain_diameter * (1.0 + p.grain_diameter_spread))
 
 
+def drag(p: Parameters, step: float) -> float:
+    """Coefficient (kg/s) of a drag under which grains of one diameter slow down within ten steps of `step` (s)."""
+    return float(math.pi / 6.0 * p.grain_density * p.grain_diameter**3 / (10.0 * step))
+
+
 def grains(p: Parameters, sites: Array, box: object) -> Packing:
     """p.grain_count grains on some of the `sites` (n, 3), chosen by the seed, each shifted by up to 0.05 d_max an axis. Diameters are
     uniform within the spread about the mean. Grains do not touch when sites are 1.15 d_max apart. DembarkError when there are fewer sites

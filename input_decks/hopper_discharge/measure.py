@@ -100,6 +100,7 @@ def measure(replicas: Replicas) -> Measurement:
     rate, last = over_replicas([run.rate() for run in runs]), over_replicas([_whole(float(run.share[-1]), run) for run in runs])
     rates = [Estimate(run.mass_rate(), run.rate().half / run.rate().value * run.mass_rate(), run.rate().basis) for run in runs]
     values = {"rate": Value(rate), "discharged": Value(last), "mass_rate": Value(over_replicas(rates)),
+              "time_80": Value(over_replicas([Estimate(reached(run.times, run.share, 0.8), math.inf, "one packing") for run in runs])),
               "bulk_density": Value(over_replicas([Estimate(run.density, math.inf, "one frame") for run in runs])),
               "fill_height": Value(exact(runs[0].height / given["outlet_width"]))}
     if not known:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from dembark.common.errors import DembarkError
-from dembark.input_decks.common.packing import Array, Packing, uniform
+from dembark.input_decks.common.packing import Array, Packing, drag, uniform
 from dembark.input_decks.common.setup import Parameters, Setup
 
 # Centres (25 000, 3) of the published grains, in units of 0.1 nm.
@@ -34,7 +34,8 @@ def setup(p: Parameters) -> Setup:
     # A wide skin: with the ball the cells of the neighbour search are ten grains wide, so lists are dear, and the ball is fast.
     return Setup(first + stride * (p.frames - 1), p.time_step, packing,
                  {"every": every, "first": first, "stride": stride, "skin": 0.5 * p.grain_diameter, "soft_step": soft_step,
-                  "fall_steps": math.ceil(p.fall_time / soft_step), "relax_steps": math.ceil(p.relax_time / p.time_step)})
+                  "fall_steps": math.ceil(p.fall_time / soft_step), "relax_steps": math.ceil(p.relax_time / p.time_step),
+                  "drag": drag(p, p.time_step)})
 
 
 def cloud(p: Parameters) -> Array:

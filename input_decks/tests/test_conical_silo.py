@@ -130,6 +130,15 @@ def test_a_small_silo_stays_shut_and_then_empties(engine: str, simulate: Any) ->
 
 
 @pytest.mark.parametrize("engine", CASE.engines)
+def test_hard_grains_lie_as_softened_ones_do(engine: str, simulate: Any) -> None:
+    """They settle softly. By their overlaps, two hundred times the modulus at once threw them up."""
+    soft, hard = (next(iter(simulate("conical_silo", engine, SMALL | {"softening": value, "duration": 0.02}).grains()))
+                  for value in (200.0, 1.0))
+    assert hard.positions[:, 2].mean() == pytest.approx(soft.positions[:, 2].mean(), rel=0.01)
+    assert np.abs(hard.positions - soft.positions).max() < 0.001
+
+
+@pytest.mark.parametrize("engine", CASE.engines)
 def test_a_run_that_has_lost_grains_resumes_exactly(engine: str, decks: Any, tmp_path: Path) -> None:
     one = decks("conical_silo", engine, tmp_path / engine, SMALL | {"grain_count": 200})
     one.run(restart_every=1000)
