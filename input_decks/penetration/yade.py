@@ -16,7 +16,7 @@ def of_pairs(*values):
     return MatchMaker(matches=[(*pair, value) for pair, value in zip(pairs, values, strict=True)])
 
 
-def loop(*recorders):
+def loop(*recorders, damping=0):
     """All engines; recorders come between forces and motion, where positions and forces belong to the same time."""
     friction = of_pairs(p.friction, p.grain_steel_friction, p.steel_friction)
     return [
@@ -29,13 +29,13 @@ def loop(*recorders):
             [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(presliding=p.presliding)],
         ),
         *recorders,
-        NewtonIntegrator(damping=0, gravity=weight),
+        NewtonIntegrator(damping=damping, gravity=weight),
     ]
 
 
-def settle(modulus, time_step, steps):
+def settle(modulus, time_step, steps, damping=0):
     """Let the grains fall or relax; with the contacts go their springs."""
-    O.materials[grain].young, O.dt, O.engines = modulus, time_step, loop()
+    O.materials[grain].young, O.dt, O.engines = modulus, time_step, loop(damping=damping)
     O.run(steps, True)
     O.interactions.clear()
     O.resetTime()
@@ -57,6 +57,8 @@ for axis, place, sense in ((0, -0.5 * p.box_length, 1), (0, 0.5 * p.box_length, 
     O.bodies.append(utils.wall(place, axis=axis, sense=sense, material=O.materials[steel]))
 if p.bed == "settled" and not dembark.options()[1]:
     settle(p.soft_modulus, p.soft_step, p.fall_steps)
+    # Softer grains overlap by more: with this modulus at once they would be thrown apart. The damping takes up that energy.
+    settle(p.youngs_modulus, p.time_step, p.relax_steps, damping=0.7)
     settle(p.youngs_modulus, p.time_step, p.relax_steps)
 O.dt = p.time_step
 for body in [*grains, ball]:
