@@ -69,7 +69,7 @@ run --include=ca-certificates,git,make "$@" --customize-hook='mkdir -p "$1/opt/d
 step "adding it to the packages that it runs with"
 printf '%s\n' "$places" LANG=C.UTF-8 > "$work/environment"
 include=$(printf '%s\n' $loaded $(cat "$work/linked") | sort -u | paste -sd,)
-run --include="$include" "$@" --customize-hook='mkdir -p "$1/opt/dembark" "$1/ch"' --customize-hook="tar-in $work/dembark.tar /opt/dembark" \
+run --include="$include" "$@" --customize-hook='mkdir -p "$1/opt" "$1/ch"' --customize-hook="tar-in $work/dembark.tar /opt" \
   --customize-hook="upload $work/environment /ch/environment" \
   --customize-hook='rm -rf "$1"/var/lib/apt/lists/* "$1"/var/cache/*' \
   --customize-hook="upload $work/try.sh /try.sh" --customize-hook='chroot "$1" sh /try.sh >&2' \
