@@ -54,7 +54,7 @@ class Site:
     def run(self, *words: str | Path, seconds: float = 1800) -> str:
         """What a command says, of which the exit code must be 0."""
         kept = {key: value for key, value in os.environ.items() if key.startswith(("PIP_", "SSL_", "HTTP", "http", "no_proxy"))}
-        environment = kept | {"HOME": str(self.home), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8",
+        environment = kept | {"HOME": str(self.home), "USER": NAME, "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8",
                               "SLURM_CONF": self.cluster.environment["SLURM_CONF"]}
         words = ("setpriv", f"--reuid={NAME}", f"--regid={NAME}", "--clear-groups", *words)
         done = subprocess.run([str(word) for word in words], cwd=self.home, env=environment, capture_output=True, text=True,
