@@ -3,7 +3,7 @@
 #
 #   packaging/container.sh [-o FOLDER] [-- OPTIONS OF MMDEBSTRAP]
 #
-# FOLDER, build/container unless it is given, then has dembark-VERSION.oci.tar, an image for Apptainer, Podman and Docker,
+# FOLDER, build/container unless it is given, then has dembark-VERSION.oci.tar, an OCI image for Apptainer and Podman,
 # dembark-VERSION.tar, the same as a root file system for Charliecloud, and packages.txt, the packages of Debian in it. The sources are those
 # of the last commit. It needs Debian's packages mmdebstrap and umoci, and either root or user namespaces. A network with a proxy of its own
 # may need options of mmdebstrap, such as --aptopt=FILE, and --customize-hook='upload FILE /usr/local/share/ca-certificates/own.crt'.

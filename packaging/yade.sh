@@ -21,6 +21,12 @@ flags=(-DDISABLE_ALL=ON -DENABLE_OPENMP=ON -DENABLE_LOGGER=ON -DENABLE_USEFUL_ER
        -DDISABLE_PKGS=fem,lbm,levelSet,openfoam,pfv,polyhedra,potential,image,vtk
        -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=12 "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG")
 
+# Features that this build leaves out, by the names of YADE's own options: YADE_FEATURES="VTK QT5" for ENABLE_VTK and ENABLE_QT5.
+for feature in ${YADE_FEATURES:-}; do
+  flags+=("-DENABLE_$feature=ON")
+  [ "$feature" != VTK ] || flags=("${flags[@]/,vtk/}")
+done
+
 die() { printf 'dembark: %s\n' "$*" >&2; exit 1; }
 answer() { printf 'YADE_PREFIX=%s\nYADE_SOURCE_DIR=%s\n' "$1" "$2"; exit 0; }
 
