@@ -47,4 +47,4 @@ def test_features_that_are_named_are_built(tmp_path: Path, features: str | None,
     subprocess.run([SCRIPT], env=environment, capture_output=True, check=False)
     words = (tmp_path / "words").read_text().split()
     assert {word for word in words if word.startswith("-DENABLE_")} >= {f"-DENABLE_{one}=ON" for one in given}
-    assert [word for word in words if word.startswith("-DDISABLE_PKGS=")][0].endswith(f"potential,{left_out}")
+    assert next(word for word in words if word.startswith("-DDISABLE_PKGS=")).endswith(f"potential,{left_out}")
