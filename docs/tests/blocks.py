@@ -172,6 +172,8 @@ NOT_RUN = (
     (r"export (?!DEMBARK_DECKS).*", "one's own engines and modules; test_names.py looks the variables up in the code"),
     (r"dembark validate .*|python docs/impact_table\.py .*", "a case in both engines takes minutes; input_decks/tests run it"),
     (r"apt-get install .*", "changes the system"),
+    (r"(ch-run|apptainer) .*|mkdir image && .*|bash /scratch/.*",
+     "needs the image of `make container`; validation/campaigns/tests/test_user_without_root.py enters it"),
     (r"pip install .*", "changes the environment; packaging/tests/test_package.py installs the package"),
     (r"build/lammps-kokkos/.*", "needs a LAMMPS with KOKKOS; plugins/lammps/tests/test_kokkos.py runs such decks"),
     (r"cmake .*", "compiles LAMMPS or the plugin; plugins/lammps/tests/test_own_build.py configures it"),

@@ -164,11 +164,12 @@ def test_toml(block: Block, tmp_path: Path) -> None:
             path.with_name(deck).touch()
         path.write_text(block.text)
         assert folders.load(path).name == "heap"
-    elif re.search("^submit = ", block.text, re.MULTILINE):
+    elif re.search("^(submit|container) = ", block.text, re.MULTILINE):
         from dembark.validation.runs import site
 
         path = tmp_path / "site.toml"
-        path.write_text(block.text)
+        rest = "" if "submit = " in block.text else (site.SHIPPED / "slurm.toml").read_text(encoding="utf-8")
+        path.write_text(f"{block.text}\n{rest}")
         assert site.read(path).submit
     else:
         from dembark.validation.campaigns.spec import read

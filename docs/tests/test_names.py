@@ -107,8 +107,8 @@ def test_options_in_the_text_exist() -> None:
     benchmarks = code("benchmarks") + code("packaging") + (ROOT / "conftest.py").read_text(encoding="utf-8")
     common = {option for parameter in typer.main.get_command(cli.app).params for option in parameter.opts}
     known = common.union(*subcommands().values()) | set(re.findall(r'"(--[a-z-]+)"', benchmarks))
-    # Words of other programs: of Slurm, srun and pytest.
-    known |= {"--partition", "--mpi", "--me", "--test-only", "--slow", "--full"}
+    # Words of other programs: of Slurm, srun, pytest and containers.
+    known |= {"--partition", "--mpi", "--me", "--test-only", "--slow", "--full", "--bind", "--cleanenv"}
     unknown = {option for span in SPANS for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", span)} - known
     assert not unknown
 

@@ -11,6 +11,8 @@ from typing import Any
 from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
 
+from . import syntax
+
 # A parameter may have the name of a function: calls are renamed.
 _FUNCTIONS = {"min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "ceil": math.ceil, "floor": math.floor, "round": round,
               "sin": math.sin, "cos": math.cos}
@@ -32,7 +34,7 @@ class Expression:
         `first(a, b)` is the first of its values that is set.
         """
         try:
-            body = ast.parse(text, mode="eval").body
+            body = syntax.expression(text)
         except SyntaxError:
             raise DembarkError(f"{text!r} is not an expression") from None
         self.text, reader = text, _Reader(text)

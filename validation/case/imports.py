@@ -17,6 +17,8 @@ from pathlib import Path
 
 import dembark
 
+from . import syntax
+
 _PACKAGE = "dembark"
 _COMPILED = (".so", ".pyd")
 _TABLES = (".csv", ".dat", ".json", ".toml", ".txt")
@@ -140,7 +142,7 @@ def _named(path: Path) -> _Names:
 @cache
 def _read(path: Path, *_state: int) -> _Names:
     try:
-        tree = ast.parse(path.read_bytes())
+        tree = syntax.module(path.read_bytes())
     except (SyntaxError, ValueError):
         return _Names(frozenset(), frozenset())
     modules, words = set[str](), set[str]()

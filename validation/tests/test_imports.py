@@ -1,14 +1,16 @@
 """Which files a Python file depends on, read from its source."""
 
+import gc
 import sys
 import threading
+import time
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
 import dembark
-from dembark.validation.case import deck, folders, imports
+from dembark.validation.case import deck, folders, imports, syntax
 from dembark.validation.judge import measurement
 
 
@@ -146,3 +148,40 @@ def test_a_neighbour_that_comes_later_is_found(tmp_path: Path) -> None:
     assert set(imports.dependencies(code).files) == {"measure.py"}
     (tmp_path / "later.py").write_text("number = 1\n")
     assert set(imports.dependencies(code).files) == {"measure.py", "later.py"}
+
+
+def test_threads_may_read_sources_at_the_same_time() -> None:
+    """In Python 3.11.2 two of them could end with a SystemError."""
+    sources = [path.read_bytes() for path in sorted(Path(imports.__file__).parents[1].rglob("*.py"))]
+    failed: list[str] = []
+
+    class Yielding:
+        """Garbage that lets another thread go on while it is collected, which may be in the middle of a tree."""
+
+        def __init__(self) -> None:
+            self.cycle = self
+
+        def __del__(self) -> None:
+            time.sleep(0.0)
+
+    def read() -> None:
+        for source in sources:
+            try:
+                Yielding()
+                syntax.module(source)
+            except SystemError as error:
+                failed.append(str(error))
+
+    before, collected = sys.getswitchinterval(), gc.get_threshold()
+    sys.setswitchinterval(1e-6)
+    gc.set_threshold(10)
+    try:
+        threads = [threading.Thread(target=read) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    finally:
+        sys.setswitchinterval(before)
+        gc.set_threshold(*collected)
+    assert not failed
