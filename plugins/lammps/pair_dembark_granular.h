@@ -28,8 +28,8 @@ class PairDembarkGranular : public Pair, dembark_family::PackedContacts {
   void coeff(int narg, char** arg) override;
   void init_style() override;
   double init_one(int i, int j) override;
-  /// m, of a grain and of two radii: for `neigh_modify collection/interval`. They override what Pair has before update 4 of 22 Jul 2025; later
-  /// LAMMPS asks for the radii alone.
+  /// m, of a grain and of two radii: for `neigh_modify collection/interval`. They override what Pair has before update 4 of 22 Jul 2025;
+  /// later LAMMPS asks for the radii alone.
   double atom2cut(int i) { return 2.0 * atom->radius[i]; }
   double radii2cut(double radius_i, double radius_j) { return radius_i + radius_j + reach(); }
   void compute(int eflag, int vflag) override;
