@@ -41,7 +41,7 @@ make all
 rm -rf /opt/cache build/python build/*.log
 find build -name '*.o' -delete
 find . -name tests -type d -not -path './.venv/*' -prune -exec rm -rf {} +
-.venv/bin/python -m compileall -q common input_decks plugins postproc validation || true
+.venv/bin/python -m compileall -q common input_decks plugins postproc validation
 find .venv build -type f \( -name '*.so*' -o -perm -u+x \) -exec ldd {} + 2> /dev/null | sed -nE 's/^.* => (\/[^ ]+) .*/\1/p' | sort -u |
   grep -v '^/opt/' | xargs realpath | xargs dpkg -S 2> /dev/null | sed 's/:.*//' | sort -u > /opt/linked
 [ -s /opt/linked ]

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.packing import drag
 from dembark.input_decks.common.setup import Array, Parameters, Setup, rectangle, time_step
 
 # The grains fall with this modulus (Pa) and fraction of the Rayleigh time.
@@ -28,8 +27,8 @@ def setup(p: Parameters) -> Setup:
     grains = packing.grains(p, places, [(-around, around), (-around, around), (-p.drop, top + 2.0 * p.grain_diameter)])
     fill_steps = math.ceil((math.sqrt(2.0 * top / p.gravity) + p.settle_time) / soft_step)
     numbers = {"modulus": modulus, "soft_modulus": FILLING["youngs_modulus"], "soft_step": soft_step, "fill_steps": fill_steps,
-               "relax_steps": math.ceil(p.relax_time / step), "drag": drag(p, step), "every": every, "first": every, "stride": stride,
-               "last": every + stride * (p.frames - 1), "skin": 0.4 * p.grain_diameter}
+               "relax_steps": math.ceil(p.relax_time / step), "drag": packing.drag(p, step), "every": every, "first": every,
+               "stride": stride, "last": every + stride * (p.frames - 1), "skin": 0.4 * p.grain_diameter}
     lines = [(p.lip_radius, 0.0), (p.barrel_radius, p.barrel_radius - p.lip_radius), (p.barrel_radius, top + p.grain_diameter)]
     corner, side = 1.1 * p.lip_radius, 2.2 * p.lip_radius
     meshes = {"shell": revolved(lines, p.sides, 5.0 * p.grain_diameter),
