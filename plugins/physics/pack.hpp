@@ -107,6 +107,16 @@ DEMBARK_HOT Pack<N, Set> select(const Mask<N, Set>& mask, const Pack<N, Set>& ye
   return typename Pack<N, Set>::Lanes(mask.lanes ? yes.lanes : no.lanes);
 }
 
+/// Of the lanes of `a` and then those of `b`, counted from 0, the ones of these numbers.
+template <int... Numbers, class Lanes>
+DEMBARK_HOT Lanes shuffled(const Lanes& a, const Lanes& b) {
+#if defined(__clang__) || __GNUC__ >= 12
+  return __builtin_shufflevector(a, b, Numbers...);
+#else
+  return __builtin_shuffle(a, b, typename detail::Vectors<sizeof...(Numbers)>::Truths{Numbers...});
+#endif
+}
+
 /// The lanes in which the mask holds, as bits.
 template <int N, class Set>
 DEMBARK_HOT unsigned bits(const Mask<N, Set>& mask) {

@@ -2,6 +2,8 @@
 // Part of fields_spread.hpp, compiled for several instruction sets.
 #pragma once
 
+#include "dembark/pack.hpp"
+
 namespace dembark::fields {
 namespace {
 
@@ -45,11 +47,11 @@ inline double* aligned(double* p) { return reinterpret_cast<double*>((reinterpre
 // `pack` moved up by one lane, with the last lane of `before` in the first.
 inline Pack moved_up(const Pack& before, const Pack& pack) {
 #if LANES == 8
-  return __builtin_shufflevector(before, pack, 7, 8, 9, 10, 11, 12, 13, 14);
+  return shuffled<7, 8, 9, 10, 11, 12, 13, 14>(before, pack);
 #elif LANES == 4
-  return __builtin_shufflevector(before, pack, 3, 4, 5, 6);
+  return shuffled<3, 4, 5, 6>(before, pack);
 #else
-  return __builtin_shufflevector(before, pack, 1, 2);
+  return shuffled<1, 2>(before, pack);
 #endif
 }
 

@@ -54,12 +54,12 @@ template <class P>
 DEMBARK_HOT void transpose(const double* r0, const double* r1, const double* r2, const double* r3, P& x, P& y, P& z, P& w) {
   typedef typename P::Lanes Lanes;
   const Lanes a = P::load(r0).lanes, b = P::load(r1).lanes, c = P::load(r2).lanes, d = P::load(r3).lanes;
-  const Lanes ab_even = __builtin_shufflevector(a, b, 0, 4, 2, 6), ab_odd = __builtin_shufflevector(a, b, 1, 5, 3, 7);
-  const Lanes cd_even = __builtin_shufflevector(c, d, 0, 4, 2, 6), cd_odd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
-  x = Lanes(__builtin_shufflevector(ab_even, cd_even, 0, 1, 4, 5));
-  z = Lanes(__builtin_shufflevector(ab_even, cd_even, 2, 3, 6, 7));
-  y = Lanes(__builtin_shufflevector(ab_odd, cd_odd, 0, 1, 4, 5));
-  w = Lanes(__builtin_shufflevector(ab_odd, cd_odd, 2, 3, 6, 7));
+  const Lanes ab_even = shuffled<0, 4, 2, 6>(a, b), ab_odd = shuffled<1, 5, 3, 7>(a, b);
+  const Lanes cd_even = shuffled<0, 4, 2, 6>(c, d), cd_odd = shuffled<1, 5, 3, 7>(c, d);
+  x = shuffled<0, 1, 4, 5>(ab_even, cd_even);
+  z = shuffled<2, 3, 6, 7>(ab_even, cd_even);
+  y = shuffled<0, 1, 4, 5>(ab_odd, cd_odd);
+  w = shuffled<2, 3, 6, 7>(ab_odd, cd_odd);
 }
 
 template <class P>

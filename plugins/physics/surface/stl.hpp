@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "../decimal.hpp"
 #include "point_grid.hpp"
 #include "triangle.hpp"
 
@@ -148,12 +148,8 @@ class TextReader {
         at_ = before, line_ = here;
         wrong("a vertex must have three numbers");
       }
-      // Not by the C library, whose decimal point is that of the user's language.
       const char* const from = first_ + (*first_ == '+' && first_ + 1 < at_ && first_[1] != '-');
-      const auto [to, error] = std::from_chars(from, at_, each);
-      const char* const exponent = std::find_if(from, at_, [](char c) { return c == 'e' || c == 'E'; });
-      if (error == std::errc::result_out_of_range && std::find(exponent, at_, '-') != at_) each = 0.0;  // too small
-      else if (error != std::errc() || to != at_ || !std::isfinite(each)) wrong("'" + std::string(first_, at_) + "' is not a number");
+      if (read_decimal(from, at_, each) != at_ || !std::isfinite(each)) wrong("'" + std::string(first_, at_) + "' is not a number");
     }
     found_.triangles.back().node[corners_++] = {x[0], x[1], x[2]};
   }
