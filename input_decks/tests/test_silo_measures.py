@@ -10,6 +10,7 @@ import xarray
 from dembark.input_decks.silo.janssen import two_parameter
 from dembark.input_decks.tests.measuring import Control, compared, dried, judged, measure, measured, module, names, pair, point
 from dembark.input_decks.tests.synthetic import DIAMETER, restated, silo
+from dembark.input_decks.tests.test_silo_floor import floor_controls
 from dembark.physics import capillary_force
 
 SILO = module("silo")
@@ -188,4 +189,5 @@ def controls_silo(folder: Path) -> Iterator[Control]:
     for name, change in {"other silos that are almost liquid": {"others": 1e-3},
                          "gravity doubled in other silos": {"heavier": 2.0}}.items():
         yield Control(name, one_calibrates, study(**change)[0])
+    yield from floor_controls()
     yield dried("silo")
