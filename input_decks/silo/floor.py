@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 
-from dembark.postproc.measurement import Array, Estimate, Measurement, Replica, Replicas, Value, exact, over_replicas, pooled, profile
+from dembark.postproc.measurement import Array, Estimate, Measurement, Replica, Replicas, Value, exact, pooled, profile
 from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.statistics import jackknife
 
@@ -32,16 +32,16 @@ _SECTORS = 10
 
 @dataclass(frozen=True)
 class Floor:
-    """The grains that touch the floor, off the side wall: normal `forces` on them (N) and their `weights` (N), `sectors` around the axis,
-    (n,); `pairs` (m, 2) of neighbours; `change`, root mean square over the mean of what forces change from the first frame to the last;
-    `shell`, share of the floor's area that grains cover as seen from above."""
+    """The n grains that touch the floor, off the side wall. (n,): normal `forces` on them and their `weights` (N), `sectors` around the
+    axis; (m, 2): `pairs` of neighbours; `change`: root mean square of what the forces change from the first frame to the last, over their
+    mean; `cover`: share of the floor that they cover as seen from above."""
 
     forces: Array
     weights: Array
     sectors: NDArray[np.int64]
     pairs: NDArray[np.int64]
     change: float
-    shell: float
+    cover: float
 
 
 def exponential_slope(f: Array, low: float = 1.0) -> float:
@@ -51,9 +51,10 @@ def exponential_slope(f: Array, low: float = 1.0) -> float:
 
 
 def power_exponent(f: Array) -> float:
-    """alpha of P(f) ~ f^alpha for LOW < f < 1, the largest likelihood: the mean of ln f is that of the law; NaN with fewer than two."""
+    """alpha of P(f) ~ f^alpha for LOW < f < 1, the largest likelihood: the mean of ln f is that of the law; NaN where too few f, almost
+    alike, leave it open."""
     logs = np.log(f[(f > LOW) & (f < 1.0)])
-    if len(logs) < 2:
+    if not len(logs):
         return math.nan
     low, mean = math.log(LOW), float(logs.mean())
 
@@ -61,9 +62,9 @@ def power_exponent(f: Array) -> float:
         """Mean of ln f of the law with exponent `power` - 1, less the one found."""
         if abs(power) < 1e-6:
             return 0.5 * low - mean
-        return -low * math.exp(power * low) / -math.expm1(power * low) - 1.0 / power - mean
+        return -low / math.expm1(-power * low) - 1.0 / power - mean
 
-    return float(brentq(excess, -50.0, 200.0)) - 1.0
+    return float(brentq(excess, -400.0, 400.0)) - 1.0 if excess(-400.0) < 0.0 < excess(400.0) else math.nan
 
 
 def law(f: Array) -> Array:
@@ -113,7 +114,7 @@ def scalars(one: Floor) -> dict[str, Estimate]:
         "floor_beta_large": of(lambda f: exponential_slope(f, 2.0), every),
         "floor_idle": jackknife(lambda keep: float(idle[keep].mean()), one.sectors, name="sectors"),
         "floor_correlation": jackknife(correlation, one.sectors, name="sectors"),
-        "floor_cover": Estimate(one.shell, math.inf, "only other packings show how much this varies"),
+        "floor_cover": Estimate(one.cover, math.inf, "only other packings show how much this varies"),
         "floor_change": exact(one.change),
     }
 
@@ -133,10 +134,9 @@ def measured(replicas: Replicas) -> Measurement:
     beyond = np.array([np.mean(together > f) for f in tail])
     with np.errstate(divide="ignore"):
         logs = np.log(beyond / beyond[0])
-    counts = over_replicas([exact(float(len(f))) for f in forces]).value
     return Measurement(values, [
         profile("floor_forces", "Forces on the floor", "force over mean force f", "P(f)", middle, density, reference=law(middle),
                 reference_label=f"f^{ALPHA:g} below, exp(−{BETA:g} f) above 1"),
         profile("floor_tail", "Large forces on the floor", "force over mean force f", "ln(share above f / share above 1)", tail, [logs],
                 reference=-BETA * (tail - 1.0), reference_label=f"exp(−{BETA:g} f)"),
-    ], [f"{counts:.0f} grains a packing touch the floor {MARGIN:g} d or more off the side wall."])
+    ], [f"{len(together) / len(forces):.0f} grains a packing touch the floor {MARGIN:g} d or more off the side wall."])
