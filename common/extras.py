@@ -5,7 +5,8 @@ from __future__ import annotations
 from .errors import DembarkError
 
 EXTRAS = {**dict.fromkeys(("xarray", "h5netcdf", "h5py", "pyvista", "vtkmodules"), "fields"),
-          **dict.fromkeys(("matplotlib", "mpl_toolkits", "PIL", "weasyprint"), "report")}
+          **dict.fromkeys(("matplotlib", "mpl_toolkits", "PIL", "weasyprint"), "report"),
+          "SALib": "campaigns"}
 
 
 def install_line(extra: str) -> str:

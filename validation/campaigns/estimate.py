@@ -7,6 +7,7 @@ import socket
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from rich.console import Console
@@ -139,6 +140,9 @@ def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], folder: Pat
     left = {one.series.place: sum(not is_finished(folder / one.series.place / run.folder_name, run) for run in one.series.runs)
             for one in found}
     console.print(runs_table(found, left))
+    for sweep in plan.facts.get("sweeps", ()):
+        if "sample" in sweep:
+            console.print(sample_line(sweep), markup=False, soft_wrap=True)
     runs, to_do = sum(len(one.series.runs) for one in found), sum(left.values())
     # Of all that is known.
     work, steps, room = (sum((getattr(one, name) or 0.0) * left[one.series.place] for one in found)
@@ -157,6 +161,14 @@ def dry_run(console: Console, plan: Plan, found: Sequence[Estimate], folder: Pat
     for line in warnings(plan, found, folder, room):
         console.print(f"warning: {line}", markup=False, style="yellow", soft_wrap=True)
     console.print(f"folder: {folder}", markup=False, soft_wrap=True)
+
+
+def sample_line(sweep: Mapping[str, Any]) -> str:
+    """A sampled sweep of `plan.json` in one line: design, points and what was left out."""
+    sample, points = sweep["sample"], sweep["points"]
+    gone = f"; {sample['left_out']} points break a condition and are left out" if sample["left_out"] else ""
+    return (f"{sweep['name']}: {sample['design'].replace('_', ' ')}, seed {sample['seed']}, {len(points)} points of "
+            f"{', '.join(sample['parameters'])}{gone}")
 
 
 def runs_table(found: Sequence[Estimate], left: dict[Path, int]) -> Table:

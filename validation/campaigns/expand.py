@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +15,11 @@ from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
 from dembark.postproc.convergence import REFINEMENT
 from dembark.validation import engines
-from dembark.validation.case.model import checked
-from dembark.validation.case.resolve import merged, resolve
 
-from .plan import Plan, Resources, Series, left_out, of_profile, series
+from .plan import MOST_RUNS, Plan, Resources, Series, left_out, of_profile, series
 from .spec import CampaignSpec, SweepSpec
 
 LONGEST_NAME = 100
-MOST_RUNS = 20000
 _DIGEST = 8
 
 
@@ -29,7 +27,8 @@ _DIGEST = 8
 class Point:
     """One point of a sweep: the folder name `variant` of its runs, the case's variant and profile that it changes, and what varies.
 
-    `values` has the swept axes only, `changes` all differences from the variant; both in SI units, None = not set.
+    `values` has the swept axes only, `changes` all differences from the variant; both in SI units, None = not set. `quantiles` are those
+    of a sample.
     """
 
     sweep: SweepSpec
@@ -38,6 +37,7 @@ class Point:
     values: Mapping[str, Value]
     changes: Mapping[str, Value]
     resolved: Mapping[str, Value]
+    quantiles: tuple[float, ...] = ()
 
 
 def _word(value: Value) -> str:
@@ -61,38 +61,21 @@ def variant_name(base: str, values: Mapping[str, Value], prefix: str = "") -> st
     return f"{name[:LONGEST_NAME - _DIGEST - 1]}_{digest}"
 
 
-def _changes(sweep: SweepSpec, base: str, row: Mapping[str, Value]) -> dict[str, Value]:
-    """All differences of a point from the variant `base`, in SI units; an expression may use those before it."""
-    changes: dict[str, Value] = {**sweep.fixed, **row}
-    if sweep.replicas is not None:
-        changes["replicas"] = sweep.replicas
-    for key, expression in sweep.derived.items():
-        parameter = sweep.case.parameters[key]
-        value = expression.evaluated(merged(sweep.case, sweep.profile, base, changes), key)
-        if isinstance(value, bool | complex):
-            raise DembarkError(f"{key} = {expression.text!r} is not a number")
-        # Grains are counted: what comes out is the next whole number.
-        counted = parameter.is_whole and isinstance(value, float) and math.isfinite(value)
-        changes[key] = checked(parameter, round(value) if counted else value)
-    return changes
-
-
 def _points(sweep: SweepSpec, where: str) -> Iterator[Point]:
     """Points of one sweep; two that come to the same numbers are a mistake."""
     seen: dict[tuple[Value, ...], str] = {}
     for base in sweep.variants:
-        for row in sweep.rows:
+        for row, quantiles in zip(sweep.rows, sweep.drawn.quantiles if sweep.drawn else repeat(()), strict=False):
             name = variant_name(base, row, sweep.name)
             try:
-                changes = _changes(sweep, base, row)
-                resolved = resolve(sweep.case, sweep.profile, base, changes)
+                changes, resolved = sweep.changes(base, row), sweep.resolved(base, row)
             except DembarkError as error:
                 raise DembarkError(f"point {name} of {where}", str(error)) from None
             twin = seen.setdefault(tuple(resolved.values()), name)
             if twin != name:
                 raise DembarkError(f"points {twin} and {name} are the same run", where, "remove one of them")
             axes = {"variant": base, **row} if len(sweep.variants) > 1 else dict(row)
-            yield Point(sweep, name, base, axes, changes, resolved)
+            yield Point(sweep, name, base, axes, changes, resolved, quantiles)
 
 
 def points(spec: CampaignSpec) -> list[Point]:
@@ -125,11 +108,12 @@ def _distinct(spec: CampaignSpec, found: Sequence[Point]) -> None:
 
 
 def _sweeps(spec: CampaignSpec, found: Sequence[Point]) -> list[dict[str, Any]]:
-    """The sweeps for a JSON file: case, name, title, axes, and their points with folder names and values in SI units."""
+    """The sweeps for a JSON file: case, name, title, axes, sample, and their points with folder names and values in SI units."""
     return [{"case": sweep.case.name, "name": sweep.name or f"sweep {sweep.number}", "title": sweep.title, "axes": list(sweep.axes),
              "engines": list(sweep.engines), "profile": sweep.profile,
+             **({"sample": sweep.sample.facts() | {"left_out": sweep.drawn.left_out}} if sweep.sample and sweep.drawn else {}),
              "points": [{"variant": point.variant, "base": point.base, "values": dict(point.values), "changes": dict(point.changes),
-                         "formal_orders": _formal_orders(point)}
+                         "formal_orders": _formal_orders(point), **({"quantiles": point.quantiles} if point.quantiles else {})}
                         for point in found if point.sweep is sweep]}
             for sweep in spec.sweeps]
 

@@ -21,6 +21,8 @@ from dembark.validation.engines import Engine
 
 # How often a run that was ended from outside is started again.
 RETRIES = 3
+# Of a campaign.
+MOST_RUNS = 20000
 # A line of grains.dump and two to three of contacts.dump for each grain and frame.
 _BYTES_PER_GRAIN_AND_FRAME = 800
 

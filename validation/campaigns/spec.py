@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +16,13 @@ from dembark.common.errors import DembarkError
 from dembark.validation import engines
 from dembark.validation.case.expressions import Expression
 from dembark.validation.case.folders import discover, files, find
-from dembark.validation.case.model import Case
-from dembark.validation.case.resolve import merged
-from dembark.validation.case.tables import ORDER, TableReader, Types, load_toml
+from dembark.validation.case.model import Case, checked
+from dembark.validation.case.resolve import merged, resolve
+from dembark.validation.case.tables import ORDER, Types, load_toml
 
 from .plan import RETRIES, Resources
+from .sample_reader import SampleReader
+from .sampling import Drawn, Sample
 
 MEASURE = "measure"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -26,7 +30,7 @@ _PER_RUN = {"ranks": int, "threads": int, "memory": str, "time": str, "restart_i
 _MEASURING = {"threads": int, "memory": str, "time": str}
 _SWEEP: dict[str, Types] = {
     "case": str, "name": str, "title": str, "profile": str, "variant": str, "variants": list, "engines": list, "grid": dict, "list": list,
-    "fixed": dict, "derived": dict, "replicas": int, "resources": dict, "formal_order": ORDER}
+    "sample": dict, "fixed": dict, "derived": dict, "replicas": int, "resources": dict, "formal_order": ORDER}
 # Keys of a sweep that [campaign] may give for all sweeps that do not have them.
 _SHARED = ("case", "variants", "fixed", "derived")
 _CAMPAIGN = {"name": str, "description": str, "profile": str, "engines": list, "replicas": int, "retries": int,
@@ -38,7 +42,7 @@ class SweepSpec:
     """One sweep: `rows` are the changes of its points, in SI units, to each of `variants`; `axes` are the names that vary, slowest first.
 
     `fixed` are changes of all points; `derived` are parameters that follow from the others of a point; `formal_order` is that of the scheme
-    in a time step or stiffness that varies (None: as the case says).
+    in a time step or stiffness that varies (None: as the case says). Where the rows are a `sample`, `drawn` has what is known of them.
     """
 
     number: int
@@ -55,11 +59,46 @@ class SweepSpec:
     replicas: int | None
     resources: Mapping[str, Resources]
     formal_order: Expression | None = None
+    sample: Sample | None = None
+    drawn: Drawn | None = None
 
     @property
     def label(self) -> str:
         """How an error line calls it."""
         return f"sweeps {self.number}"
+
+    def changes(self, base: str, row: Mapping[str, Value]) -> dict[str, Value]:
+        """All differences of the point `row` from the variant `base`, in SI units; an expression may use those before it."""
+        changes: dict[str, Value] = {**self.fixed, **row}
+        if self.replicas is not None:
+            changes["replicas"] = self.replicas
+        for key, expression in self.derived.items():
+            parameter = self.case.parameters[key]
+            value = expression.evaluated(merged(self.case, self.profile, base, changes), key)
+            if isinstance(value, bool | complex):
+                raise DembarkError(f"{key} = {expression.text!r} is not a number")
+            # Grains are counted: what comes out is the next whole number.
+            counted = parameter.is_whole and isinstance(value, float) and math.isfinite(value)
+            changes[key] = checked(parameter, round(value) if counted else value)
+        return changes
+
+    def resolved(self, base: str, row: Mapping[str, Value]) -> dict[str, Value]:
+        """All parameters of the point `row` of the variant `base`; DembarkError where it breaks a condition."""
+        return resolve(self.case, self.profile, base, self.changes(base, row))
+
+    def broken(self, row: Mapping[str, Value], variants: Iterable[str] = ()) -> str:
+        """The condition that the point `row` breaks in one of `variants`, of all when none is named; "" for none."""
+        try:
+            for base in variants or self.variants:
+                self.resolved(base, row)
+        except DembarkError as error:
+            return str(error)
+        return ""
+
+    def sampled(self, sample: Sample) -> SweepSpec:
+        """The sweep with the points of `sample`, each of which is allowed in all variants."""
+        drawn = sample.draw(self.broken)
+        return replace(self, rows=drawn.rows, sample=sample, drawn=drawn)
 
 
 @dataclass(frozen=True)
@@ -116,7 +155,7 @@ def _refuse_decimal_commas(path: Path) -> None:
                                f"line {bare.count(chr(10), 0, part.start() + tight.start()) + 1} of {path}")
 
 
-class _Reader(TableReader):
+class _Reader(SampleReader):
     """Turns the tables of one campaign file into a CampaignSpec; each mistake names the table it is in."""
 
     def campaign(self, data: Mapping[str, Any]) -> CampaignSpec:
@@ -151,12 +190,6 @@ class _Reader(TableReader):
         if not _NAME.fullmatch(text):
             raise self.fail(table, f"name = {text!r} is not a name of a folder", "give up to 64 letters, digits, '.', '_' and '-'")
 
-    def least(self, table: str, data: Mapping[str, Any], **lows: int) -> None:
-        """DembarkError when one of the numbers in `data` is below its least value."""
-        for key, low in lows.items():
-            if data.get(key, low) < low:
-                raise self.fail(table, f"{key} = {data[key]} is out of range", f"it must be >= {low}")
-
     def names(self, table: str, data: Mapping[str, Any], key: str, known: Iterable[str], what: str) -> tuple[str, ...]:
         """The list `key` of different ones among `known`; empty when it is not given."""
         if key not in data:
@@ -187,29 +220,41 @@ class _Reader(TableReader):
             raise self.fail(table, "profile is missing", f"name it here or in [campaign]: {', '.join(case.profiles)}")
         pick(profile, case.profiles, "profile", f"{self.where(table)}, case {case.name}")
         fixed, rows = self.values(f"{table}.fixed", entry.get("fixed", {}), case), self.rows(table, entry, case)
-        for key in fixed.keys() & rows[0].keys():
+        sample = self.sample(f"{table}.sample", entry["sample"], case) if "sample" in entry else None
+        axes = tuple(sample.variables if sample else rows[0])
+        for key in fixed.keys() & set(axes):
             raise self.fail(f"{table}.fixed", f"{key} is fixed and varies", "remove it from one of the two")
         self.one_of(table, entry, "variant", "variants", "give one of them")
         one = {"variants": [entry["variant"]]} if "variant" in entry else entry
         variants = self.names(table, one, "variants", case.variants, "variant")
-        if rows == [{}] and not variants:
-            raise self.fail(table, "nothing varies", "give grid, list or variants")
+        if not axes and not variants:
+            raise self.fail(table, "nothing varies", "give grid, list, sample or variants")
         variants = variants or (next(iter(case.variants)),)
-        # Its own engines, else those of the campaign that the case has, else all of the case that can do all points; optional ones have to
-        # be named, so that a campaign is the same on every machine.
-        needed = [merged(case, profile, one, {**fixed, **row}) for one in variants for row in rows]
-        chosen = (self.names(table, entry, "engines", case.engines, "engine")
-                  or tuple(name for name in case.engines if (name in head["engines"] if "engines" in head else
-                                                             not engines.facts(name).optional
-                                                             and not any(case.missing_capabilities(name, values) for values in needed))))
-        if not chosen:
-            raise self.fail(table, f"case {case.name} runs in none of the campaign's engines", f"it runs in {', '.join(case.engines)}")
-        return SweepSpec(
+        chosen = self.names(table, entry, "engines", case.engines, "engine")
+        spec = SweepSpec(
             number, case, entry.get("name", ""), entry.get("title", ""), profile, variants, chosen,
-            (*(("variant",) if len(variants) > 1 else ()), *rows[0]), tuple(rows), fixed,
-            self.derived(f"{table}.derived", entry.get("derived", {}), rows[0].keys() | fixed.keys(), case),
+            (*(("variant",) if len(variants) > 1 else ()), *axes), tuple(rows), fixed,
+            self.derived(f"{table}.derived", entry.get("derived", {}), {*axes, *fixed}, case),
             self.replicas(table, entry, case, head), self.resources(f"{table}.resources", entry.get("resources", {}), base),
             self.order(table, entry, case.parameters))
+        if sample:
+            try:
+                spec = spec.sampled(sample)
+            except DembarkError as error:
+                raise self.fail(f"{table}.sample", str(error)) from None
+        return spec if spec.engines else replace(spec, engines=self.capable(table, spec, head))
+
+    def capable(self, table: str, spec: SweepSpec, head: Mapping[str, Any]) -> tuple[str, ...]:
+        """The engines of a sweep that names none: those of the campaign that the case has, else all of the case that can do all points;
+        optional ones have to be named, so that a campaign is the same on every machine."""
+        case = spec.case
+        needed = [merged(case, spec.profile, one, {**spec.fixed, **row}) for one in spec.variants for row in spec.rows]
+        chosen = tuple(name for name in case.engines if (name in head["engines"] if "engines" in head else
+                                                         not engines.facts(name).optional
+                                                         and not any(case.missing_capabilities(name, values) for values in needed)))
+        if not chosen:
+            raise self.fail(table, f"case {case.name} runs in none of the campaign's engines", f"it runs in {', '.join(case.engines)}")
+        return chosen
 
     def replicas(self, table: str, entry: Mapping[str, Any], case: Case, head: Mapping[str, Any]) -> int | None:
         self.least(table, entry, replicas=1)
@@ -221,7 +266,8 @@ class _Reader(TableReader):
 
     def rows(self, table: str, entry: Mapping[str, Any], case: Case) -> list[dict[str, Value]]:
         """Changes of each point; all have the same parameters."""
-        self.one_of(table, entry, "grid", "list", "give one of them, or make two sweeps")
+        for one, other in combinations(("grid", "list", "sample"), 2):
+            self.one_of(table, entry, one, other, "give one of them, or make two sweeps")
         if "grid" in entry:
             return self.grid(f"{table}.grid", entry["grid"], case)
         return self.listed(table, entry["list"], case) if "list" in entry else [{}]
@@ -268,11 +314,6 @@ class _Reader(TableReader):
             if not isinstance(text, str):
                 raise self.fail(table, f"{key} = {text!r} has the wrong type", "write an expression in a text, or move it to fixed")
         return {key: self.expression(table, text, case.parameters) for key, text in texts.items()}
-
-    def known(self, table: str, key: str, case: Case) -> None:
-        if key == "replicas":
-            raise self.fail(table, "replicas is not a parameter of a sweep", "write replicas = ... in [[sweeps]] or [campaign]")
-        pick(key, case.parameters, "parameter", f"{self.where(table)}, case {case.name}")
 
     def values(self, table: str, entry: Mapping[str, Any], case: Case) -> dict[str, Value]:
         for key, given in entry.items():

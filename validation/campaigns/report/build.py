@@ -41,12 +41,15 @@ def _chapters(gathered: ReportData, drawn: Path) -> dict[str, Any]:
 
 def _sweep(sweep: Sweep, gathered: ReportData, drawn: Path) -> dict[str, Any]:
     quantities = sweep.quantities()
-    chosen, name = quantities[:_PANELS], sweep.name
+    # A sample has a panel for each parameter.
+    chosen, name = quantities[:max(1, _PANELS // len(sweep.axes)) if sweep.sample else _PANELS], sweep.name
     tables.write_table_csv(drawn / f"{name}.csv", sweep)
     write_atomic(drawn / f"{name}.tex", tables.latex(sweep, quantities).encode())
     study = figures.study_figure(sweep, chosen)
     shown = [embed(study, drawn, f"{name}-study",
                    "Quantities along the sweep with 95 % intervals; grey dashed: reference of each point.")] if study else []
+    points = figures.sample_figure(sweep, chosen)
+    shown += [embed(points, drawn, f"{name}-sample", "Quantities at the points of the sample with 95 % intervals.")] if points else []
     maps = {engine: figures.map_figure(sweep, engine, chosen) for engine in sweep.engines}
     shown += [embed(one, drawn, f"{name}-map-{engine}", f"{engine_name(engine)} over both parameters; red frames mark failed checks.")
               for engine, one in maps.items() if one]

@@ -32,7 +32,7 @@ def study_figure(sweep: Sweep, quantities: Sequence[QuantityRecord]) -> Figure |
     """Each quantity along the sweep's main axis with 95 % intervals, a line for each combination of the others and engine; its
     reference dashed in grey. None for a sweep without a numeric axis."""
     along = sweep.along
-    if along is None or not quantities:
+    if along is None or not quantities or sweep.sample:
         return None
     with matplotlib.rc_context(STYLE):
         figure, panels = _panels(len(quantities))
@@ -63,6 +63,28 @@ def _study_panel(axes: Any, sweep: Sweep, along: str, quantity: QuantityRecord, 
         axes.set_xscale("log")
 
 
+def sample_figure(sweep: Sweep, quantities: Sequence[QuantityRecord]) -> Figure | None:
+    """Each quantity of a sample against each parameter, with 95 % intervals. None for a sweep that is no sample."""
+    if not sweep.sample or not quantities:
+        return None
+    pairs = [(quantity, axis) for quantity in quantities for axis in sweep.axes if sweep.numeric(axis)]
+    with matplotlib.rc_context(STYLE):
+        figure, panels = _panels(len(pairs))
+        handles: dict[str, Any] = {}
+        for axes, (quantity, axis) in zip(panels, pairs, strict=True):
+            for number, engine in enumerate(sweep.engines):
+                found = [(float(point.values[axis]), one) for point in sweep.points if (one := point.quantity(engine, quantity.name))]
+                handle = axes.errorbar([at for at, _ in found], [one.value for _, one in found], yerr=_bars(found), linestyle="",
+                                       color=colour(engine), marker=MARKS[number % len(MARKS)], markersize=2.4, elinewidth=0.5, alpha=0.7)
+                handles.setdefault(engine_name(engine), handle)
+            axes.set(xlabel=sweep.label(axis), ylabel=_unit(quantity))
+            axes.set_title(_title(quantity), fontsize=7.0)
+            if sweep.sample["parameters"][axis].startswith("log"):
+                axes.set_xscale("log")
+        figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=min(4, max(1, len(handles))), fontsize=6.8)
+    return figure
+
+
 def _bars(line: Sequence[tuple[float, QuantityRecord]]) -> np.ndarray[Any, Any]:
     """Lower and upper parts (2, n) of the 95 % intervals."""
     values = np.array([one.value for _, one in line], float)
@@ -80,6 +102,8 @@ def _title(quantity: QuantityRecord, length: int = 36) -> str:
 
 def map_axes(sweep: Sweep) -> tuple[str, str] | None:
     """The two axes of a map: of a sweep that is a full grid over exactly two axes with at least two values each."""
+    if sweep.sample:
+        return None
     wide = [axis for axis in sweep.axes if len(sweep.levels(axis)) > 1]
     if len(wide) != 2:
         return None

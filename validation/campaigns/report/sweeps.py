@@ -15,13 +15,14 @@ from dembark.validation.report.gather import Page
 
 @dataclass(frozen=True)
 class Point:
-    """One point of a sweep: the swept `values` (None = the parameter is not set), the folder name `variant`, `results` by engine, and the
-    scheme's `formal_orders` in parameters of the method that vary."""
+    """One point of a sweep: the swept `values` (None = the parameter is not set), the folder name `variant`, `results` by engine, the
+    scheme's `formal_orders` in parameters of the method that vary, and the `quantiles` of a sample."""
 
     values: Mapping[str, Any]
     variant: str
     results: Mapping[str, Result]
     formal_orders: Mapping[str, float] = field(default_factory=dict)
+    quantiles: Sequence[float] = ()
 
     def quantity(self, engine: str, name: str) -> QuantityRecord | None:
         """The measured quantity of that name; None where it was not measured or has no number."""
@@ -31,7 +32,8 @@ class Point:
 
 @dataclass(frozen=True)
 class Sweep:
-    """The points of one sweep of a campaign, and the names of the parameters that vary along it, the slowest first."""
+    """The points of one sweep of a campaign, and the names of the parameters that vary along it, the slowest first; `sample` says how they
+    were drawn, empty for a grid or a list."""
 
     case: str
     title: str
@@ -39,6 +41,7 @@ class Sweep:
     points: tuple[Point, ...]
     name: str = field(default="")
     units: Mapping[str, str] = field(default_factory=dict)
+    sample: Mapping[str, Any] = field(default_factory=dict)
 
     def label(self, axis: str) -> str:
         """An axis for a figure, with its unit: `wall friction`, `grain diameter / m`."""
@@ -67,12 +70,13 @@ class Sweep:
 
     def quantities(self) -> list[QuantityRecord]:
         """The quantities worth a picture, once each: those that failed first, then those that are checked or that the engines must agree
-        in."""
+        in; of a sample those that it names, if it does."""
+        named = self.sample.get("quantities", ())
         found: dict[str, QuantityRecord] = {}
         failed: set[str] = set()
         for one in (one for point in self.points for result in point.results.values() for one in result.quantities):
             failed |= {one.name} if one.standing == "failed" else set()
-            if one.value is not None and (one.compared or one.standing != "information"):
+            if one.value is not None and (one.name in named if named else one.compared or one.standing != "information"):
                 found.setdefault(one.name, one)
         return sorted(found.values(), key=lambda one: one.name not in failed)
 
@@ -99,13 +103,14 @@ def sweeps(facts: Sequence[Mapping[str, Any]], pages: Iterable[Page], cases: Map
 
 def _sweep(facts: Mapping[str, Any], number: int, measured: Mapping[tuple[str, str], Mapping[str, Result]], known: Case | None) -> Sweep:
     case, axes = facts["case"], tuple(facts["axes"])
-    points = tuple(Point(point["values"], point["variant"], measured.get((case, point["variant"]), {}), point.get("formal_orders", {}))
+    points = tuple(Point(point["values"], point["variant"], measured.get((case, point["variant"]), {}), point.get("formal_orders", {}),
+                         point.get("quantiles", ()))
                    for point in facts["points"])
     along = " × ".join(axis.replace("_", " ") for axis in axes) or "one point"
     title = facts.get("title") or f"{case.replace('_', ' ').capitalize()}: {along}"
     # A case that has gone since leaves its results without units of the axes.
     units = {axis: known.parameters[axis].unit for axis in axes if known and axis in known.parameters}
-    return Sweep(case, title, axes, points, f"{case}-{number}", units)
+    return Sweep(case, title, axes, points, f"{case}-{number}", units, facts.get("sample", {}))
 
 
 def words(values: Mapping[str, Any]) -> str:
@@ -129,9 +134,10 @@ class NumericalError:
 
 
 def numerical_errors(sweeps: Iterable[Sweep]) -> list[NumericalError]:
-    """What the sweeps along the time step or the stiffness say, for every quantity that is checked or compared."""
+    """What the grids and lists along the time step or the stiffness say, for every quantity that is checked or compared."""
     return [_judged(sweep, engine, parameter, others, line)
-            for sweep in sweeps for parameter in sweep.axes if parameter in REFINEMENT and len(sweep.levels(parameter)) > 1
+            for sweep in sweeps if not sweep.sample
+            for parameter in sweep.axes if parameter in REFINEMENT and len(sweep.levels(parameter)) > 1
             for one in sweep.quantities() for engine in sweep.engines
             for others, line in sweep.lines(parameter, engine, one.name) if len(line) > 1]
 
