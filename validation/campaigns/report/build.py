@@ -14,11 +14,15 @@ from dembark.validation.report.figures import engine_name
 from dembark.validation.report.gather import ReportData, gather
 from dembark.validation.report.sections import embed
 
-from . import figures, tables
+from . import figures, sensitivity, tables
 from .sweeps import Point, Sweep, numerical_errors, sweeps
 
 # A page that shows everything shows nothing: the rest is in the tables.
 _PANELS = 9
+_BARS = {"morris": "Mean absolute elementary effect μ* of each parameter over its range, with bootstrapped 95 % intervals; below the "
+                   "dashed line, a tenth of the largest, a parameter does not matter.",
+         "saltelli": "Total Sobol index of each parameter, with bootstrapped 95 % intervals; below the dashed line, a twentieth of the "
+                     "variance, a parameter does not matter."}
 
 
 def build(folder: Path) -> Path:
@@ -53,8 +57,13 @@ def _sweep(sweep: Sweep, gathered: ReportData, drawn: Path) -> dict[str, Any]:
     maps = {engine: figures.map_figure(sweep, engine, chosen) for engine in sweep.engines}
     shown += [embed(one, drawn, f"{name}-map-{engine}", f"{engine_name(engine)} over both parameters; red frames mark failed checks.")
               for engine, one in maps.items() if one]
+    effects = sensitivity.sensitivities(sweep, quantities)
+    if bars := figures.sensitivity_figure(effects, _PANELS):
+        sensitivity.write_csv(drawn / f"{name}-sensitivity.csv", effects)
+        shown.append(embed(bars, drawn, f"{name}-sensitivity", _BARS[sweep.sample["design"]], [f"{name}-sensitivity.csv"]))
     compared = {page.variant: page.comparison for page in gathered.pages if page.case == sweep.case}
     return {"sweep": sweep, "shown": len(chosen), "left_out": len(quantities) - len(chosen), "figures": shown,
+            "effects": effects, "negligible": sensitivity.negligible_everywhere(effects),
             "verdicts": [_verdicts(sweep, point, compared.get(point.variant)) for point in sweep.points]}
 
 

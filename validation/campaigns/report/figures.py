@@ -14,6 +14,7 @@ from dembark.postproc.style import GREY, SEQUENTIAL, STYLE
 from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.report.figures import MARKS, WIDE, colour, engine_name, symbols
 
+from .sensitivity import Sensitivity
 from .sweeps import Sweep, words
 
 _DASHES = ["-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 3))]
@@ -82,6 +83,39 @@ def sample_figure(sweep: Sweep, quantities: Sequence[QuantityRecord]) -> Figure 
             if sweep.sample["parameters"][axis].startswith("log"):
                 axes.set_xscale("log")
         figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=min(4, max(1, len(handles))), fontsize=6.8)
+    return figure
+
+
+def sensitivity_figure(found: Sequence[Sensitivity], panels: int) -> Figure | None:
+    """Bars of what each parameter does, a panel for each of the first quantities, with 95 % intervals; dashed: below it nothing matters.
+    None where nothing was analysed."""
+    analysed = [one for one in found if one.effects]
+    names = list(dict.fromkeys(one.quantity.name for one in analysed))[:panels]
+    if not names:
+        return None
+    rows = len(analysed[0].effects)
+    lines = list(dict.fromkeys((one.engine, one.at) for one in analysed))
+    thick = 0.8 / len(lines)
+    with matplotlib.rc_context(STYLE):
+        figure, drawn = _panels(len(names), max(1.2, 0.5 + 0.26 * rows))
+        figure.subplots_adjust(left=0.17, wspace=0.75)
+        handles: dict[str, Any] = {}
+        for axes, name in zip(drawn, names, strict=True):
+            for one in (one for one in analysed if one.quantity.name == name):
+                number = lines.index((one.engine, one.at))
+                at = np.arange(rows) + thick * (number - 0.5 * (len(lines) - 1))
+                paler = 1.0 / (1 + [each for each, _ in lines[:number]].count(one.engine))
+                bars = axes.barh(at, [each.index for each in one.effects], xerr=[each.half for each in one.effects], height=0.9 * thick,
+                                 color=colour(one.engine), alpha=paler, error_kw={"elinewidth": 0.8})
+                handles.setdefault(", ".join(filter(None, (engine_name(one.engine), one.at))), bars)
+                (other,) = axes.plot([each.other for each in one.effects], at, linestyle="", marker="|", markersize=5.0, color="black")
+                handles.setdefault("σ of the effects" if one.design == "morris" else "first-order index", other)
+                axes.axvline(one.limit, color=GREY, linewidth=0.8, linestyle=_DASHES[1])
+                axes.set_yticks(range(rows), [each.parameter.replace("_", " ") for each in one.effects])
+                axes.set_xlabel("total index" if one.design == "saltelli" else f"μ*, {_unit(one.quantity)}")
+                axes.set_title(_title(one.quantity, 30), fontsize=7.0)
+            axes.invert_yaxis()
+        figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=min(4, len(handles)), fontsize=6.8)
     return figure
 
 
