@@ -18,7 +18,7 @@ from .errors import DembarkError, RunError
 
 DISK_FULL = "the disk is full"
 _TIMESTEP = b"ITEM: TIMESTEP\n"
-_IMPACT_COLUMNS = 11
+_IMPACT_COLUMNS = 17
 
 
 def _sync(path: Path) -> None:
@@ -135,7 +135,7 @@ def _finite(words: Iterable[str]) -> bool:
 
 
 def check_impacts(path: Path) -> int:
-    """Number of impacts in an `impacts.txt`; RunError when it is missing, cut off or holds a line that is not eleven finite numbers."""
+    """Number of impacts in an `impacts.txt`; RunError when it is missing, cut off or holds a line that is not seventeen finite numbers."""
     text = _written(path)
     if not text.startswith("#"):
         raise RunError(f"{path.name} does not begin with a header")

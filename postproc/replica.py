@@ -17,6 +17,7 @@ from dembark.common.choices import Known
 from dembark.common.parallel import cores_here
 
 from . import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
+from .impacts import COLUMNS, read_impacts
 
 Array = NDArray[np.float64]
 Source = TypeVar("Source")
@@ -58,19 +59,12 @@ class Replica:
         return read_times(self.folder / "time.csv")
 
     def impacts(self) -> Array:
-        """Impacts that have ended, (n, 11): id_a id_b time duration peak_force impulse relative_speed dissipated x y z; SI units.
+        """Impacts that have ended, (n, 17), in the columns of `dembark.postproc.impacts.COLUMNS`; SI units.
 
         Bodies are counted from 1, by the offset that the record holds for engines that count from 0; id_b < 0 is a wall. DumpError when the
         file cannot be read.
         """
-        path = self.folder / "impacts.txt"
-        try:
-            rows = [line.split() for line in path.read_text(encoding="ascii").splitlines() if not line.startswith("#")]
-            table = np.array(rows, float).reshape(len(rows), 11)
-        except OSError as error:
-            raise DumpError(f"{path} cannot be read: {error.strerror}") from None
-        except ValueError:
-            raise DumpError(f"{path}: a line does not hold 11 numbers") from None
+        table = read_impacts(self.folder / "impacts.txt").view(float).reshape(-1, len(COLUMNS))
         table[:, :2] += int(self.record.get("impact_id_offset", 0)) * (table[:, :2] >= 0)
         return table
 

@@ -107,7 +107,7 @@ void bind_impact(nb::module_& m) {
              const std::size_t samples = h.time.size(), n = scene.bodies().size();
              return nb::make_tuple(numpy(h.time, {samples}), numpy(h.position, {samples, n, 3}), numpy(h.velocity, {samples, n, 3}),
                                    numpy(h.spin, {samples, n, 3}), numpy(h.report, {samples, 14}), numpy(h.column, {samples, left.size()}),
-                                   table(impacts, 11));
+                                   table(impacts, 17));
            })
       .def("contacts", [](const Scene& scene) { return table(scene.system().contacts(), 14); })
       .def("kinetic_energy_of_half_step", &Scene::kinetic_energy_of_half_step)

@@ -304,8 +304,10 @@ void LcpImpact::preSave(LcpImpact&) {
 
 void LcpImpact::writeImpacts() {
 	const std::vector<impact::Impact> ended = system->take_finished();
+	std::vector<std::string>          names;
+	for (const auto& wall : wallList) names.push_back(wall->name);
 	try {
-		file.open(impactsFile, "");
+		file.open(impactsFile, impact::wall_legend(names));
 		file.append(ended);
 	} catch (const std::runtime_error& error) {
 		fail(std::string("LcpImpact.impactsFile: ") + error.what(), 1);

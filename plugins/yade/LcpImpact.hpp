@@ -68,7 +68,7 @@ public:
 		((int,mask,0,,"Only spheres whose :yref:`Body.mask` has a bit in common; 0 = all"))
 		((vector<int>,ids,,,"Only these spheres; empty = all"))
 		((bool,velocityAtStart,false,,"The velocities that the logs have when the engine runs first belong to the same time as their positions (as in LIGGGHTS), and are moved half a step back; False: they are already half a step behind, as YADE keeps them"))
-		((string,impactsFile,"",Attr::triggerPostLoad,"File for one line per ended impact; empty = none"))
+		((string,impactsFile,"",Attr::triggerPostLoad,"File for one line, with a name that ends in .bin for one record, per ended impact; empty = none"))
 		((long,contactCount,0,Attr::readonly,"Pairs near enough to be looked at in the last step"))
 		((long,activeCount,0,Attr::readonly,"Contacts with a force in the last step"))
 		((long,impactsBegun,0,Attr::readonly,"Impacts begun since the start"))

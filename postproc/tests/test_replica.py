@@ -3,6 +3,7 @@
 import pytest
 
 from dembark.postproc import DumpError
+from dembark.postproc.impacts import COLUMNS
 from dembark.postproc.replica import Replica, cached_per_replica
 
 
@@ -24,11 +25,12 @@ def test_a_record_without_derived_numbers_has_none(tmp_path):
 
 
 def test_bodies_are_counted_from_one_in_every_engine(tmp_path):
-    (tmp_path / "impacts.txt").write_text("# a\n0 3 0 0 0 0 0 0 0 0 0\n1 -2 0 0 0 0 0 0 0 0 0\n")
+    header, rest = f"# {' '.join(COLUMNS)}\n", " 0" * (len(COLUMNS) - 2)
+    (tmp_path / "impacts.txt").write_text(f"{header}0 3{rest}\n1 -2{rest}\n")
     assert Replica(tmp_path, {"impact_id_offset": 1}).impacts()[:, :2].tolist() == [[1, 4], [2, -2]]
     assert Replica(tmp_path, {}).impacts()[:, :2].tolist() == [[0, 3], [1, -2]]
-    (tmp_path / "impacts.txt").write_text("# a\n0 3 0\n")
-    with pytest.raises(DumpError, match="11 numbers"):
+    (tmp_path / "impacts.txt").write_text(f"{header}0 3 0\n")
+    with pytest.raises(DumpError, match="17 numbers"):
         Replica(tmp_path, {}).impacts()
 
 

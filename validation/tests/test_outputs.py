@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 
 from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import check_impacts
+from dembark.postproc.impacts import COLUMNS
 from dembark.validation.case import folders, model
 from dembark.validation.runs import outcome
 
-HEADER = "# impacts that have ended\n# id_a id_b time duration peak_force impulse relative_speed dissipated x y z\n"
-ROW = "1 -1 0.5 1e-3 1.2e4 6 2 0.1 0 0.1 0\n"
+HEADER = f"# impacts that have ended\n# {' '.join(COLUMNS)}\n"
+ROW = "1 -1 0.5 1e-3 1.2e4 6 2 0.1 0 0.1 0 0.01 0 1 0 0.3 0\n"
 
 
 def with_outputs(decks: Path, words: str) -> model.Case:

@@ -42,11 +42,8 @@ class Coupling {
 
   /// Before the first step. Throws std::runtime_error with one line.
   void open_file() {
-    std::string about;
-    for (std::size_t w = 0; w < command.walls.size(); ++w)
-      about += (w ? ", " : "") + std::to_string(-1 - static_cast<long>(w)) + " = " + command.walls[w];
     try {
-      file_.open(command.impacts_file, about.empty() ? "there is none" : about);
+      file_.open(command.impacts_file, wall_legend(command.walls));
     } catch (const std::runtime_error& e) {
       throw std::runtime_error(std::string("impacts: ") + e.what());
     }

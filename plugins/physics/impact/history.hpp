@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <tuple>
 #include <vector>
 
@@ -45,6 +46,40 @@ struct Histories {
     contacts.clear();
   }
   auto fields() { return std::tie(keys, contacts, report, begun); }
+};
+
+/// How far bodies have turned since the first step. Logs in cross-section turn about one axis of coordinates, so the sum of the
+/// components of their spin is the spin about it; of bodies that turn about any axis the number means nothing.
+class Turns {
+ public:
+  /// rad, of body number `i` of the last call of turn().
+  double operator[](int i) const { return angles_[std::size_t(i)]; }
+
+  /// elapsed: s, in which the bodies had their spins. New ones begin at 0.
+  void turn(const std::vector<Body>& bodies, double elapsed) {
+    const std::size_t n = bodies.size();
+    bool same = ids_.size() == n;
+    for (std::size_t i = 0; same && i < n; ++i) same = ids_[i] == bodies[i].id;
+    if (!same) take(bodies);
+    for (std::size_t i = 0; i < n; ++i) angles_[i] += elapsed * (bodies[i].spin.x + bodies[i].spin.y + bodies[i].spin.z);
+  }
+
+  auto fields() { return std::tie(ids_, angles_); }
+
+ private:
+  void take(const std::vector<Body>& bodies) {
+    std::map<std::int64_t, double> known;
+    for (std::size_t i = 0; i < ids_.size(); ++i) known[ids_[i]] = angles_[i];
+    ids_.clear();
+    angles_.clear();
+    for (const Body& body : bodies) {
+      ids_.push_back(body.id);
+      angles_.push_back(known[body.id]);
+    }
+  }
+
+  std::vector<std::int64_t> ids_;
+  std::vector<double> angles_;
 };
 
 class HistoryKeeper {

@@ -1,4 +1,4 @@
-// The file of impacts: one line for each impact that has ended, written at once.
+// The file of impacts: one line, or one record of float64, for each impact that has ended, written at once.
 #pragma once
 
 #include <cerrno>
@@ -17,6 +17,16 @@
 namespace dembark {
 namespace impact {
 
+/// What the numbers of the walls stand for.
+inline std::string wall_legend(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t w = 0; w < names.size(); ++w) {
+    const std::string number = std::to_string(w + 1);
+    text += (w ? ", -" : "-") + number + " = " + (names[w].empty() ? "wall " + number : names[w]);
+  }
+  return text.empty() ? "there is none" : text;
+}
+
 /// Appends impacts and knows how many bytes are right, so that a run that is taken up again neither repeats what was written after its
 /// state was saved nor loses what was written before. Throws std::runtime_error with one line.
 class ImpactFile {
@@ -32,12 +42,14 @@ class ImpactFile {
     if (!path.empty()) begin(path, about);
   }
 
-  /// A new file. about: what the numbers of the walls stand for, or nothing.
+  /// A new file. about: what the numbers of the walls stand for. A name that ends in .bin: records only, of the machine's doubles.
   void begin(std::string path, const std::string& about) {
     path_ = std::move(path);
     bytes_ = 0;
-    put("w", (about.empty() ? "" : "# impacts that have ended, SI units; id_b < 0 is a wall: " + about + "\n") +
-                 "# id_a id_b time duration peak_force impulse relative_speed dissipated x y z\n");
+    put("w", binary() ? ""
+                      : "# impacts that have ended, SI units; id_b < 0 is a wall: " + about +
+                            "\n# id_a id_b time duration peak_force impulse relative_speed dissipated x y z friction_loss nx ny nz "
+                            "turn_a turn_b\n");
   }
 
   /// Goes on with the file behind its first `bytes`; the rest is cut off.
@@ -58,8 +70,13 @@ class ImpactFile {
     if (path_.empty() || impacts.empty()) return;
     std::string lines;
     for (const Impact& impact : impacts) {
+      const std::vector<double> row = table_row(impact);
+      if (binary()) {
+        lines.append(reinterpret_cast<const char*>(row.data()), row.size() * sizeof(double));
+        continue;
+      }
       char number[32];
-      for (const double x : table_row(impact)) lines.append(number, std::size_t(std::snprintf(number, sizeof number, "%.12g ", x)));
+      for (const double x : row) lines.append(number, std::size_t(std::snprintf(number, sizeof number, "%.12g ", x)));
       lines.back() = '\n';
     }
     put("a", lines);
@@ -69,6 +86,8 @@ class ImpactFile {
   auto fields() { return std::tie(path_, bytes_); }
 
  private:
+  bool binary() const { return path_.size() > 4 && path_.compare(path_.size() - 4, 4, ".bin") == 0; }
+
   [[noreturn]] void fail(const std::string& what) const { throw std::runtime_error("file " + path_ + " " + what); }
 
   void put(const char* mode, const std::string& lines) {

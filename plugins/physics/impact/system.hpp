@@ -102,6 +102,7 @@ class System {
     }
     report_.contacts = int(found_.size());
     weight_ = again ? weight_ : kick_;
+    turns_.turn(bodies, history_.last().begun ? time - time_ : 0.0);
     time_ = time;
     finish(bodies);
     return report_;
@@ -132,7 +133,7 @@ class System {
     assembly_.clear();
     report_ = history_.last().report;
   }
-  auto fields() { return std::tie(format_, time_, weight_, history_); }
+  auto fields() { return std::tie(format_, time_, weight_, history_, turns_); }
 
  private:
   void begin(const std::vector<Body>& bodies, double kick) {
@@ -244,8 +245,7 @@ class System {
     now.deformation = (n + r.viscous * before.deformation) * r.compliance;
     // Below the last digit of the gap, what is left of it acts on nothing any more.
     if (!now.active && now.deformation < std::numeric_limits<double>::epsilon() * std::abs(r.gap)) now.deformation = 0.0;
-    now.elastic = 0.5 * r.stiffness * now.deformation * now.deformation +
-                  0.5 * tangential_stiffness(r) * dot(now.friction.displacement, now.friction.displacement);
+    now.elastic = 0.5 * r.stiffness * now.deformation * now.deformation + sheared(r, now);
     report_.elastic_energy += now.elastic;
 
     // What the bodies (and the wall) put into the contact and its springs do not hold is lost.
@@ -259,8 +259,12 @@ class System {
       impact.time = time_;
       impact.relative_speed = -motion_.gap_rate(r);
       impact.point = r.point;
+      impact.normal = r.normal;
+      impact.turn_a = turns_[r.a];
+      impact.turn_b = r.b >= 0 ? turns_[r.b] : 0.0;
     }
     impact.dissipated += lost;
+    impact.friction_loss -= length * dot(friction_.force[i], motion_.surface_velocity(r)) + sheared(r, now) - sheared(r, before);
     if (now.active) {
       ++report_.active;
       impact.duration += length;
@@ -274,11 +278,17 @@ class System {
     if (!now.idle()) history_.add({r.key_a, r.key_b}, now);
   }
 
-  FormatVersion format_{3.0};
+  /// J, in the friction spring.
+  static double sheared(const Row& row, const ContactHistory& history) {
+    return 0.5 * tangential_stiffness(row) * dot(history.friction.displacement, history.friction.displacement);
+  }
+
+  FormatVersion format_{4.0};
   Settings settings_;
   Screening screening_;
   Assembly assembly_;
   HistoryKeeper history_;
+  Turns turns_;
   Motion motion_;
   FrictionForces friction_;
   NormalForces solver_;

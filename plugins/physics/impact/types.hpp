@@ -189,8 +189,14 @@ struct Impact {
   double relative_speed = 0.0;  ///< m/s, approach along the normal at the beginning, positive = closing
   double dissipated = 0.0;      ///< J, in this contact
   Vec3<double> point{};         ///< m, of contact at the beginning
+  double friction_loss = 0.0;   ///< J, of `dissipated`: by sliding and by the dash-pot along the contact
+  Vec3<double> normal{};        ///< from b to a, at the beginning
+  double turn_a = 0.0;          ///< rad, that a has turned by since the first step, at the beginning; see Turns
+  double turn_b = 0.0;          ///< likewise, of b; 0: wall
 
-  auto fields() { return std::tie(a, b, time, duration, peak_force, impulse, relative_speed, dissipated, point); }
+  auto fields() {
+    return std::tie(a, b, time, duration, peak_force, impulse, relative_speed, dissipated, point, friction_loss, normal, turn_a, turn_b);
+  }
 };
 
 /// The row of a contact or an impact in a table: its fields in their order, with the second key as users see it.

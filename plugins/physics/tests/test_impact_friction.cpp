@@ -195,6 +195,56 @@ TEST_CASE("oblique impact: linear and angular momentum, and the loss by friction
   CHECK(scene.kinetic_energy_of_half_step() < 0.99 * energy);
 }
 
+TEST_CASE("an impact knows its loss by friction, its normal, and how far the logs have turned before") {
+  const double spin = 7.0, fall = 0.01, mu = 0.05;  // slides
+  for (const int along : {0, 1, 2}) {               // the axis of the logs
+    const auto place = [along](double across, double up) {
+      return along == 0 ? Vec3<double>{0, across, up} : along == 1 ? Vec3<double>{up, 0, across} : Vec3<double>{across, up, 0};
+    };
+    Body b = log_at(3, 0, 0), fixed = log_at(4, 0, 0);
+    b.force = fixed.force = {};
+    b.position = place(0, 2.0 * r + fall);
+    b.velocity = place(0.0, -1.0);
+    fixed.mass = fixed.inertia = INFINITY;
+    (along == 0 ? b.spin.x : along == 1 ? b.spin.y : b.spin.z) = spin;
+    (along == 0 ? fixed.spin.x : along == 1 ? fixed.spin.y : fixed.spin.z) = -2.0;
+    Scene scene(settings(1e-6, mu), {b, fixed});
+    scene.run(30000);
+    const std::vector<Impact> ended = scene.system().take_finished();
+    REQUIRE(ended.size() == 1);
+    const Impact& one = ended[0];
+    CHECK(norm(one.normal - place(0, 1)) < 1e-6);
+    CHECK_THAT(one.turn_a, WithinRel(spin * fall, 1e-3));
+    CHECK_THAT(one.turn_b, WithinRel(-2.0 * fall, 1e-3));
+    const auto tangential = [&](const Vec3<double>& v, double w) {
+      return 0.5 * m * std::pow(dot(v, place(1, 0)), 2) + 0.5 * cylinder_inertia(m, r) * w * w;
+    };
+    // The log that is moved turns against the friction on it, or with it.
+    const Vec3<double> v = scene.velocity()[0], w = scene.spin()[0];
+    const double turned = along == 0 ? w.x : along == 1 ? w.y : w.z, impulse = m * dot(v, place(1, 0));
+    CHECK_THAT(std::abs(impulse), WithinRel(mu * one.impulse, 1e-2));  // the friction spring has to wind up first
+    const double work = std::abs(impulse) * 2.0 * r;
+    const double lost = tangential({}, spin) - tangential(v, turned) - work;
+    CHECK_THAT(one.friction_loss, WithinRel(lost, 1e-2));  // the lever arm is shorter by the overlap
+    CHECK(one.friction_loss < one.dissipated);
+  }
+}
+
+TEST_CASE("bodies keep how far they have turned when others come and go, and in another order") {
+  std::vector<Body> bodies(3);
+  for (int i = 0; i < 3; ++i) bodies[std::size_t(i)].id = 10 + i, bodies[std::size_t(i)].spin = {0, double(1 + i), 0};
+  Turns turns;
+  turns.turn(bodies, 0.5);
+  std::swap(bodies[0], bodies[2]);
+  bodies[1].id = 7;
+  turns.turn(bodies, 0.25);
+  CHECK((turns[0] == 3 * 0.75 && turns[1] == 2 * 0.25 && turns[2] == 0.75));
+  Turns again;
+  from_numbers(to_numbers(turns), again);
+  again.turn(bodies, 0.25);
+  CHECK((again[0] == 3.0 && again[1] == 1.0 && again[2] == 1.0));
+}
+
 TEST_CASE("logs in a groove come to rest at any step, however stiff they are") {
   for (const double wt : {0.05, 1.0, 5.0})
     for (const double theta : {1.0, 0.75}) {

@@ -1,4 +1,5 @@
 // What adapters of engines share: tables of materials, pairs across a boundary, the forces of the last step, the file of impacts.
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -153,8 +154,10 @@ TEST_CASE("the file of impacts: begun, gone on with, gone") {
   file.begin(path, "-1 = floor, -2 = shell");
   const std::string header = text();
   CHECK(header.find("-2 = shell\n# id_a id_b time") != std::string::npos);
+  CHECK(wall_legend({"floor", "shell", ""}) == "-1 = floor, -2 = shell, -3 = wall 3");
+  CHECK(wall_legend({}) == "there is none");
   file.append({one});
-  CHECK(text() == header + "3 -2 0.25 0 0 2 0 0 1 2 3\n");
+  CHECK(text() == header + "3 -2 0.25 0 0 2 0 0 1 2 3 0 0 0 0 0 0\n");
   CHECK(file.bytes() == static_cast<long long>(text().size()));
 
   ImpactFile again;
@@ -169,6 +172,26 @@ TEST_CASE("the file of impacts: begun, gone on with, gone") {
   // A full disk, found when a line is written and when the file is closed.
   for (const std::size_t length : {std::size_t(1), std::size_t(100000)})
     CHECK_THROWS_WITH(file.begin("/dev/full", std::string(length, 'x')), Catch::Contains("cannot be written: No space left"));
+}
+
+TEST_CASE("the file of impacts as records of doubles, of the same numbers") {
+  const std::string path = (std::filesystem::temp_directory_path() / "dembark-test-impacts.bin").string();
+  Impact one;
+  one.a = 3, one.b = wall_key(1), one.time = 0.1, one.turn_a = 2.0 / 3.0;
+  ImpactFile file;
+  file.begin(path, "-1 = floor");
+  CHECK(std::filesystem::file_size(path) == 0);
+  file.append({one, one});
+  const std::vector<double> row = table_row(one);
+  std::vector<double> found(2 * row.size());
+  std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(found.data()), std::streamsize(found.size() * sizeof(double)));
+  CHECK(std::filesystem::file_size(path) == found.size() * sizeof(double));
+  CHECK(std::equal(row.begin(), row.end(), found.begin()));
+  CHECK(std::equal(row.begin(), row.end(), found.begin() + std::ptrdiff_t(row.size())));
+  ImpactFile again;
+  again.resume(path, static_cast<long long>(row.size() * sizeof(double)));
+  CHECK(std::filesystem::file_size(path) == row.size() * sizeof(double));
+  std::remove(path.c_str());
 }
 
 TEST_CASE("a step done again loses once more what contacts held that are no candidates any more") {

@@ -41,6 +41,10 @@ class Impact:
     relative_speed: float  # m/s, approach along the normal at the beginning, positive = closing
     dissipated: float  # J, in this contact
     point: tuple[float, float, float]  # m, of contact at the beginning
+    friction_loss: float  # J, of `dissipated`: by sliding and by the dash-pot along the contact
+    normal: tuple[float, float, float]  # from b to a, at the beginning
+    turn_a: float  # rad, that a has turned by since the first step, at the beginning; in the plane only
+    turn_b: float  # likewise, of b; 0: wall
 
 
 @dataclass(frozen=True)
@@ -158,8 +162,8 @@ def _wall_key(number: int) -> int:
 
 
 def _impact(row: list[float]) -> Impact:
-    a, b, time, duration, peak, impulse, speed, dissipated, x, y, z = row
-    return Impact(int(a), int(b), time, duration, peak, impulse, speed, dissipated, (x, y, z))
+    a, b, time, duration, peak, impulse, speed, dissipated, x, y, z, friction, nx, ny, nz, turn_a, turn_b = row
+    return Impact(int(a), int(b), time, duration, peak, impulse, speed, dissipated, (x, y, z), friction, (nx, ny, nz), turn_a, turn_b)
 
 
 @dataclass

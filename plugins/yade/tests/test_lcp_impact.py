@@ -123,8 +123,10 @@ def test_oblique_impact_keeps_momentum_and_angular_momentum_and_the_plane(found)
 
 def test_records_of_impacts(found):
     lines = found["records"]["text"].splitlines()
-    assert lines[0] == "# id_a id_b time duration peak_force impulse relative_speed dissipated x y z"
-    rows = [[float(word) for word in line.split()] for line in lines[1:]]
+    assert lines[0] == "# impacts that have ended, SI units; id_b < 0 is a wall: -1 = wall 1"
+    assert lines[1] == ("# id_a id_b time duration peak_force impulse relative_speed dissipated x y z friction_loss nx ny nz "
+                        "turn_a turn_b")
+    rows = [[float(word) for word in line.split()] for line in lines[2:]]
     assert len(rows) == 2 == found["records"]["outputs"]["impactsBegun"]
     pair, = (row for row in rows if row[1] >= 0)
     wall, = (row for row in rows if row[1] < 0)
@@ -135,14 +137,14 @@ def test_records_of_impacts(found):
     assert pair[4] == pytest.approx(math.sqrt(k * m), rel=2e-3)
     assert pair[5] == pytest.approx(2 * m, rel=2e-3)
     assert pair[6] == pytest.approx(1.0, rel=1e-9)
-    assert pair[8:] == pytest.approx([0.15, 0, 0], abs=1e-5)
+    assert pair[8:] == pytest.approx([0.15, 0, 0, 0, -1, 0, 0, 0, 0], abs=1e-5)
     assert wall[:2] == [3, -1]
     assert wall[5] == pytest.approx(40.0 * 3.0 * 2, rel=2e-3)
     assert wall[6] == pytest.approx(3.0, rel=1e-9)
 
 
 def test_totals_belong_to_the_records(found):
-    rows = [[float(word) for word in line.split()] for line in found["records"]["text"].splitlines()[1:]]
+    rows = [[float(word) for word in line.split()] for line in found["records"]["text"].splitlines()[2:]]
     totals = found["records"]["outputs"]
     assert totals["impulseSum"] == pytest.approx(sum(row[5] for row in rows), rel=1e-9)
     assert totals["highestForce"] == pytest.approx(max(row[4] for row in rows), rel=1e-9)
