@@ -1,4 +1,4 @@
-"""The commands `dembark fields` and `dembark walls`."""
+"""The commands `dembark fields`, `dembark walls` and `dembark debark`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from dembark.common.errors import DembarkError, Interrupted
 from dembark.common.extras import missing_extra
 
-from .cli_options import contact_columns, frame_numbers, length, positive
+from .cli_options import contact_columns, frame_numbers, length, positive, removal_force
 from .contacts import ContactColumnsError
 from .dumps.frames import ColumnsError, DensityError, DumpError, DumpWarning
 from .grains import GrainFrame
@@ -191,6 +191,67 @@ def walls(
         written += save(plot, {name: figure for one in results for name, figure in wall_figures(one).items()})
     _say([*chosen.lines(diameters), *loads.mesh_notes(), *(f"note: {one}; add --wall" for one in loads.notes),
           *(line for one in results for line in wall_lines(one, opened)), *(f"written: {path}" for path in written)])
+
+
+@app.command()
+def debark(
+    sources: Annotated[list[Path], typer.Argument(metavar="IMPACTS|RUN...", help=(
+        "Files of impacts (.txt, .bin), folders of runs, or of their replicas: each is a load."))],
+    grains: Annotated[Path | None, typer.Option(help="Dump with id, radius and mass of the logs; default: that of the run.")] = None,
+    bark_force: Annotated[float | None, typer.Option(parser=positive("N", "--bark-force"), metavar="TEXT", help=(
+        "Peak force from which an impact removes bark; or give the bond's strength, see --bond."))] = None,
+    wood_force: Annotated[float | None, typer.Option(parser=positive("N", "--wood-force"), metavar="TEXT", help=(
+        "Peak force above which it damages the wood. Required."))] = None,
+    bond: Annotated[str | None, typer.Option(metavar="SPECIES:CONDITION|STRENGTH", help=(
+        "Shear strength of the bond of bark and wood, such as '0.4 MPa' or spruce:dormant; with --area and --friction."))] = None,
+    area: Annotated[float | None, typer.Option(parser=positive("m^2", "--area"), metavar="TEXT", help=(
+        "Area that an impact shears: '20 cm^2'."))] = None,
+    friction: Annotated[float | None, typer.Option(min=1e-9, help="Friction coefficient between logs.")] = None,
+    clears: Annotated[float | None, typer.Option(parser=positive("m", "--clears"), metavar="TEXT", help=(
+        "Width of the circumference that an effective impact clears of bark: '5 mm'."))] = None,
+    energy: Annotated[float | None, typer.Option(parser=positive("J/m^2", "--energy"), metavar="TEXT", help=(
+        "Or: energy of friction per area that takes bark off: '2 kJ/m^2'."))] = None,
+    speed: Annotated[float | None, typer.Option(parser=positive("rad/s", "--speed"), metavar="TEXT", help=(
+        "Speed of the drum: '11.5 rpm'; default: that of the run."))] = None,
+    begin: Annotated[float | None, typer.Option(min=0.0, help="Begin of the window in s; default: after the run-in of the run.")] = None,
+    end: Annotated[float | None, typer.Option(min=0.0, help="Its end in s; default: the last impact, or that of the run.")] = None,
+    least_speed: Annotated[float | None, typer.Option(min=0.0, help=(
+        "Approach (m/s) from which a contact is an impact; default: that of the run, or 0."))] = None,
+    stiffness: Annotated[float | None, typer.Option(parser=positive("N/m", "--stiffness"), metavar="TEXT", help=(
+        "Local stiffness of a log, for the wood-loss index; default: that of the run."))] = None,
+    length_: Annotated[float | None, typer.Option("--length", parser=positive("m", "--length"), metavar="TEXT", help=(
+        "Length of the logs; default: that of the run."))] = None,
+    sectors: Annotated[int, typer.Option(min=1, max=3600, help="Sectors of the circumference.")] = 12,
+    out: Annotated[Path | None, typer.Option(help="NetCDF file of doses and degree, for xarray.")] = None,
+    plot: Plot = None,
+) -> None:
+    """Degree of debarking and wood damage from the impacts of logs in a drum."""
+    from .debarking import ForceRange, RemovalLaw, outcome
+    from .debarking.report import dataset, figures, lines
+    from .debarking.sources import Given, files_of, load_of
+
+    if wood_force is None:
+        raise DembarkError("the force that damages wood is not given", "", "give it with --wood-force; there is no default")
+    forces = ForceRange(removal_force(bark_force, bond, area, friction), wood_force)
+    law = RemovalLaw(clears, energy) if clears or energy else None
+    files = [file for source in sources for file in files_of(source)]
+    _check_places(out, plot=plot, read=(*files, grains))
+    given = Given(grains, speed, begin, end, least_speed, stiffness, length_)
+    results = []
+    with progress("debark", len(files)) as advance:
+        for file in files:
+            results.append(outcome(load_of(file, given), forces, law, sectors))
+            advance()
+    written = []
+    if out:
+        from .output.netcdf import write_netcdf
+
+        written.append(write_netcdf(out, dataset(results, **_provenance("debark", sources[0]))))
+    if plot:
+        from .plots import save
+
+        written += save(plot, figures(results))
+    _say([*lines(results), *(f"written: {path}" for path in written)])
 
 
 def _check_places(out: Path | None, *collections: Path | None, plot: Path | None, read: Iterable[Path | None]) -> None:

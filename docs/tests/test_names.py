@@ -98,9 +98,10 @@ def test_commands_and_options_exist() -> None:
 
 
 def test_table_of_options() -> None:
-    named = {option for cell in rows(TEXTS["docs/how-to/fields.md"], "option") for option in re.findall(r"`(--[a-z-]+)`", cell)}
-    assert named <= subcommands()["fields"] | subcommands()["walls"]
-    assert {option for option in subcommands()["fields"] if option.startswith("--")} - named == {"--help"}
+    for page, first, *more in (("fields", "fields", "walls"), ("debarking", "debark")):
+        named = {option for cell in rows(TEXTS[f"docs/how-to/{page}.md"], "option") for option in re.findall(r"`(--[a-z-]+)`", cell)}
+        assert named <= subcommands()[first].union(*(subcommands()[name] for name in more))
+        assert {option for option in subcommands()[first] if option.startswith("--")} - named == {"--help"}
 
 
 def test_options_in_the_text_exist() -> None:

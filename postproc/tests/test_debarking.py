@@ -1,0 +1,252 @@
+"""Debarking from impacts: what was put into the records is found, on the right side of the right log, and laws have their known limits."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from dumps import grains_text
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from dembark.common.errors import DembarkError
+from dembark.postproc import DumpError
+from dembark.postproc.debarking import (
+    ForceRange,
+    Load,
+    Logs,
+    RemovalLaw,
+    bark_force,
+    bond,
+    dose,
+    doses,
+    outcome,
+    peak_of_duration,
+    peak_of_impulse,
+    peak_of_speed,
+)
+from dembark.postproc.impacts import COLUMNS, RECORD
+from dembark.validation.cli import main
+
+RANGE = ForceRange(1000.0, 5000.0)
+PERIOD = 2.0
+LOGS = Logs(np.array([1, 2, 3]), np.array([0.05, 0.1, 0.12]), np.array([10.0, 30.0, 40.0]), 1.5)
+
+
+def records(count: int, seed: int = 0, **fields: object) -> np.ndarray:
+    """Impacts of the drum's shell on log 1 at its lowest point, with a force in the range, spread over four revolutions."""
+    found = np.zeros(count, RECORD)
+    found["id_a"], found["id_b"], found["peak_force"], found["relative_speed"] = 1, -1, 2000.0, 1.0
+    found["nz"], found["duration"], found["impulse"] = 1.0, 0.01, 2000.0 * 0.01 * 2.0 / math.pi
+    found["time"] = np.random.default_rng(seed).uniform(0.0, 4 * PERIOD, count)
+    for name, values in fields.items():
+        found[name] = values
+    return found
+
+
+def load(impacts: np.ndarray, logs: Logs = LOGS, **more: float) -> Load:
+    return Load(impacts, logs, 0.0, 4 * PERIOD, PERIOD, **more)
+
+
+@given(angle=st.floats(-math.pi, math.pi), turn_a=st.floats(-50.0, 50.0), turn_b=st.floats(-50.0, 50.0), axis=st.integers(0, 2))
+def test_contacts_are_on_the_sector_of_the_logs_own_frame(angle: float, turn_a: float, turn_b: float, axis: int) -> None:
+    """A mark on the log, at the contact's angle less the rotation, lies in the sector that gets the impact; b gets it on its other side."""
+    normal = dict.fromkeys(("nx", "ny", "nz"), 0.0)
+    across, up = (("ny", "nz"), ("nz", "nx"), ("nx", "ny"))[axis]
+    normal |= {across: math.cos(angle), up: math.sin(angle)}
+    # A second impact tells the axis where the first one's normal lies in two planes; it is outside of the window.
+    impacts = records(2, id_b=2, turn_a=turn_a, turn_b=turn_b, time=[1.0, 100.0], **normal)
+    impacts["nx ny nz".split()[axis]] = 0.0
+    impacts[across][1], impacts[up][1] = 0.6, 0.8
+    found = doses(impacts, LOGS, RANGE, np.array([0.0, PERIOD]), sectors=360)
+    for log, place in ((0, angle + math.pi - turn_a), (1, angle - turn_b)):
+        hit = int(np.flatnonzero(found.useful[0, log])[0])
+        apart = (math.radians(hit + 0.5) - place + math.pi) % (2.0 * math.pi) - math.pi
+        assert abs(apart) < math.radians(0.5) + 1e-6
+    assert found.useful.sum() == 2 and found.damaging.sum() == 0
+
+
+def test_forces_are_sorted_by_the_range_and_slow_contacts_only_rub() -> None:
+    forces, speeds = [999.0, 1000.0, 5000.0, 5001.0, 9000.0, 3000.0], [1, 1, 1, 1, 1, 0.01]
+    impacts = records(6, peak_force=forces, relative_speed=speeds, friction_loss=2.0)
+    found = doses(impacts, LOGS, RANGE, np.array([0.0, 4 * PERIOD]), least_speed=0.1, stiffness=1e6)
+    assert (found.useful.sum(), found.damaging.sum(), found.friction.sum()) == (2, 2, 12.0)
+    assert found.excess.sum() == pytest.approx((5001.0**2 + 9000.0**2 - 2 * 5000.0**2) / 2e6)
+    assert len(found.peaks) == 5 and found.shape[1] == pytest.approx(0.5)
+
+
+def test_two_logs_share_the_friction_and_each_is_hit() -> None:
+    found = doses(records(1, id_b=3, friction_loss=2.0), LOGS, RANGE, np.array([0.0, 4 * PERIOD]))
+    assert found.friction.sum(axis=(0, 2)).tolist() == [1.0, 0.0, 1.0]
+    assert found.useful.sum(axis=(0, 2)).tolist() == [1.0, 0.0, 1.0]
+
+
+def test_pieces_of_a_long_file_add_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(1)
+    angle = random.uniform(-math.pi, math.pi, 100)
+    impacts = records(100, nx=np.cos(angle), nz=np.sin(angle), id_a=random.integers(1, 3, 100), id_b=3, turn_a=random.normal(0, 9, 100),
+                      peak_force=random.uniform(0, 8000, 100), friction_loss=random.random(100))
+    edges = np.linspace(0.0, 4 * PERIOD, 17)
+    whole = doses(impacts, LOGS, RANGE, edges)
+    monkeypatch.setattr(dose, "_CHUNK", 7)
+    parts = doses(impacts, LOGS, RANGE, edges)
+    for name in ("useful", "damaging", "friction", "peaks"):
+        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name))
+    assert whole.effective.sum() > 100
+
+
+def even_impacts(count: int, seed: int = 2) -> np.ndarray:
+    """At random on all sides of log 1."""
+    return records(count, seed, turn_a=np.random.default_rng(seed + 1).uniform(0.0, 2.0 * math.pi, count), friction_loss=0.5)
+
+
+ONE = Logs(np.array([1]), np.array([0.1]), np.array([30.0]), 1.5)
+
+
+def test_impacts_at_random_clear_a_log_as_the_coverage_law_says() -> None:
+    width = 0.002
+    found = outcome(load(even_impacts(900), ONE), RANGE, RemovalLaw(width=width))
+    expected = 1.0 - math.exp(-900 * width / (2.0 * math.pi * 0.1))
+    assert found.degree[0] == 0.0 and (np.diff(found.degree) >= 0.0).all()
+    assert found.degree[-1] == pytest.approx(expected, abs=0.01)
+    assert found.even(np.array([4.0]))[0] == pytest.approx(expected, rel=1e-9)
+    assert found.values["sector_dispersion"].value == pytest.approx(1.0, abs=0.8)
+    time = found.values["debarking_time"].value
+    assert found.even(np.array([time / PERIOD]))[0] == pytest.approx(0.9, rel=1e-9)
+    assert time == pytest.approx(4 * PERIOD * math.log(10.0) * 2.0 * math.pi * 0.1 / (900 * width), rel=1e-9)
+    assert found.values["useful_impacts"].value == pytest.approx(900 / 4)
+    low, high = found.values["useful_impacts"].interval
+    assert low < 900 / 4 < high
+
+
+def test_a_log_that_is_hit_on_one_side_keeps_its_bark_on_the_other() -> None:
+    found = outcome(load(records(900), ONE), RANGE, RemovalLaw(width=0.02))
+    assert found.degree[-1] == pytest.approx(1.0 / 12.0, rel=1e-6)
+    assert found.values["sector_dispersion"].value == pytest.approx(900.0)
+    assert found.even(np.array([4.0]))[0] > 0.99
+
+
+def test_energy_of_friction_takes_bark_off() -> None:
+    energy, area = 200.0, 2.0 * math.pi * 0.1 * 1.5
+    found = outcome(load(even_impacts(900), ONE), RANGE, RemovalLaw(energy=energy))
+    assert found.degree[-1] == pytest.approx(1.0 - math.exp(-450.0 / (energy * area)), abs=0.02)
+    assert found.values["friction_work"].value == pytest.approx(450.0 / 4 / area)
+
+
+def test_harder_impacts_damage_more_wood() -> None:
+    soft, hard = (outcome(load(records(400, peak_force=force), stiffness=1e6), RANGE).values for force in (4000.0, 6000.0))
+    assert soft["damaging_share"].value == soft["wood_loss_index"].value == 0.0
+    assert hard["damaging_share"].value == 1.0
+    assert hard["wood_loss_index"].value == pytest.approx(400 * (6000.0**2 - 5000.0**2) / 2e6 / 80.0 / 4)
+    assert "debarking_degree" not in hard
+
+
+def test_forces_of_impulses_are_those_of_the_motion() -> None:
+    k, m, v = 4e6, 20.0, 1.5
+    for zeta in (0.0, 0.2, 0.5):
+        c = 2.0 * zeta * math.sqrt(k * m)
+        done = solve_ivp(lambda _, y, c=c: [y[1], -(k * y[0] + c * y[1]) / m], (0.0, math.pi / math.sqrt(k / m)), [0.0, v], rtol=1e-10,
+                         atol=1e-12, max_step=1e-5)
+        force = np.maximum(k * done.y[0] + c * done.y[1], 0.0)
+        assert force.max() <= peak_of_speed(v, k, m) * (1.0 + 1e-6)
+        if zeta == 0.0:
+            impulse = np.array([np.trapezoid(force, done.t)])
+            assert force.max() == pytest.approx(peak_of_speed(v, k, m), rel=1e-6)
+            assert peak_of_impulse(impulse, k, m, 1.0) == pytest.approx(force.max(), rel=1e-5)
+            assert peak_of_duration(impulse, np.array([done.t[-1]])) == pytest.approx(force.max(), rel=1e-5)
+
+
+def test_force_of_a_bond() -> None:
+    assert bark_force(bond("spruce", "dormant").strength, 2e-3, 0.4) == pytest.approx(1800.0)
+
+
+@pytest.mark.parametrize(("work", "message"), [
+    (lambda: ForceRange(3000.0, 2000.0), "removes bark, 3000 N, is not below the one that damages wood, 2000 N"),
+    (lambda: ForceRange(0.0, 2000.0), "must be > 0 N"),
+    (lambda: bond("pine", "dormant"), "'pine', .*give the force or the strength itself"),
+    (lambda: bond("spruce", "frozen"), "spruce in the condition 'frozen', known are dormant, growing"),
+    (RemovalLaw, "one positive number"),
+    (lambda: RemovalLaw(width=0.01, energy=1.0), "one positive number"),
+    (lambda: outcome(load(records(9)), RANGE, RemovalLaw(width=0.03)), "a sector of the thinnest log has 26.2 mm, take fewer sectors"),
+    (lambda: outcome(load(records(9), Logs(LOGS.ids, LOGS.radii, LOGS.masses)), RANGE, RemovalLaw(energy=1.0)), "length of the logs"),
+    (lambda: outcome(load(records(9, id_a=7)), RANGE), "that of log 7, which is not among the 3 logs"),
+    (lambda: outcome(load(records(3, nx=[1, 0, 0], ny=[0, 1, 0], nz=[0, 0, 1])), RANGE), "do not lie in a plane")])
+def test_mistakes_are_one_line(work: object, message: str) -> None:
+    assert callable(work)
+    with pytest.raises((DembarkError, DumpError), match=message) as error:
+        work()
+    assert "\n" not in str(error.value)
+
+
+@pytest.fixture
+def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Three loads of two logs in the current folder, in both forms of the file."""
+    monkeypatch.chdir(tmp_path)
+    for number in (1, 2, 3):
+        folder = tmp_path / "out" / f"replica-{number}"
+        folder.mkdir(parents=True)
+        impacts = even_impacts(400 + 20 * number, number)
+        impacts["time"] += PERIOD
+        table = impacts.view(float).reshape(-1, len(COLUMNS))
+        if number == 3:
+            (folder / "impacts.bin").write_bytes(table.tobytes())
+        else:
+            np.savetxt(folder / "impacts.txt", table, fmt="%.12g", header=" ".join(COLUMNS))
+        place = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]])
+        (folder / "grains.dump").write_text(grains_text(0, place, np.array([0.1, 0.1]), masses=np.array([30.0, 30.0])))
+        (folder / "run.json").write_text(json.dumps({
+            "time_step": 0.01, "steps": round(5 * PERIOD / 0.01), "parameters": {
+                "drum_speed": 2.0 * math.pi / PERIOD, "run_in": 1, "log_length": 1.5, "log_stiffness": 1e6, "impact_speed": 0.1}}))
+    return tmp_path
+
+
+def test_command_reads_the_loads_of_a_run(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["debark", "out", "--bark-force", "1 kN", "--wood-force", "5 kN", "--clears", "2 mm", "--out", "d.nc", "--plot", "p"]) == 0
+    said = capsys.readouterr().out
+    assert "3 loads of 2 logs, 4 revolutions of 2 s each, from 2 s on" in said
+    # 440 impacts in four revolutions, on one of the two logs; Student's interval over 420, 440, 460.
+    assert f"impacts in the range, per log and revolution: 55 ± {4.303 * 2.5 / math.sqrt(3):.2g}\n" in said
+    assert "degree of debarking at the end" in said and "time to 90%" not in said.split("±")[0]
+    with xarray.open_dataset("d.nc") as found:
+        assert found.useful_impacts.sum(("log", "sector")).values.tolist() == [420, 440, 460]
+        assert found.degree.sizes == {"load": 3, "revolutions": 17} and found.bark_force == 1000.0
+    assert sorted(path.name for path in (runs / "p").iterdir()) == ["degree.png", "doses.png", "forces.png"]
+
+
+def test_command_reads_a_file_of_the_users_own(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (runs / "mine.txt").write_bytes((runs / "out/replica-1/impacts.txt").read_bytes())
+    words = ["debark", "mine.txt", "--grains", "out/replica-1/grains.dump", "--wood-force", "5 kN",
+             "--bond", "spruce:dormant", "--area", "20 cm^2", "--friction", "0.4"]
+    assert main([*words, "--speed", "30 rpm"]) == 0
+    said = capsys.readouterr().out
+    assert "range of forces: 1800 to 5000 N" in said and "wood-loss" not in said
+    assert main(words) == 2
+    assert "the speed of the drum of mine.txt is not known" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    (["--wood-force", "1 kN"], "give --bark-force, or --bond with --area and --friction; there is no default"),
+    (["--bark-force", "1 kN"], "the force that damages wood is not given"),
+    (["--bark-force", "9 kN", "--wood-force", "1 kN"], "is not below the one that damages wood, 1000 N"),
+    (["--bond", "1 MPa", "--wood-force", "1 kN"], "--area is missing"),
+    (["--bond", "pine:dormant", "--area", "1 cm^2", "--friction", "0.4", "--wood-force", "1 kN"], "is known for 'pine'"),
+    (["--bark-force", "1 N", "--wood-force", "1 kN", "--clears", "2 mm", "--energy", "3 J/m^2"], "one positive number"),
+    (["--bark-force", "1 N", "--wood-force", "1 kN", "--begin", "9", "--end", "9.1"], "less than a quarter of a revolution")])
+def test_mistakes_of_the_command_are_one_line(runs: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str) -> None:
+    assert main(["debark", str(runs / "out"), *words]) == 2
+    said = capsys.readouterr().err
+    assert message in " ".join(said.split()) and said.count("\n") == 1
+
+
+def test_missing_columns_are_named(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = runs / "out/replica-1/impacts.txt"
+    path.write_text(path.read_text().replace("friction_loss ", "").replace(" turn_a", ""))
+    assert main(["debark", str(path), "--bark-force", "1 N", "--wood-force", "1 kN"]) == 2
+    assert "lacks the columns friction_loss turn_a" in capsys.readouterr().err
+    assert main(["debark", str(runs), "--bark-force", "1 N", "--wood-force", "1 kN"]) == 2
+    assert "has no impacts.txt or impacts.bin" in capsys.readouterr().err
