@@ -15,6 +15,8 @@ ROWS = 200
 def setup(p: Parameters) -> Setup:
     """Diameters are the middles of n equal parts of their range: the same set for every seed, so that the filling is met exactly. Places
     are a lattice of triangles, a little wider than the thickest log; the seed says which log has which diameter."""
+    if (p.bark_force is None) != (p.wood_force is None) or (p.cleared_width is not None and p.bark_force is None):
+        raise DembarkError("bark_force and wood_force belong together, and cleared_width needs both", "", "set both, or none of the three")
     mean, span = 0.5 * (p.log_diameter_min + p.log_diameter_max), p.log_diameter_max - p.log_diameter_min
     n, square = p.logs, mean**2 + span**2 / 12.0 * (1.0 - 1.0 / p.logs**2)
     radius = 0.5 * math.sqrt(n * square / p.filling) if p.drum_radius is None else p.drum_radius

@@ -15,6 +15,7 @@ from dembark.postproc.statistics import replica_mean
 
 REST = 0.1  # the share of the run, at its end, in which the stack is at rest
 WALLS = (-1, -2, -3)  # ground, left and right stake
+SPENT = 0.99  # the share of the energy that is dissipated when a collapse counts as over
 FIRST = 10  # impacts from the beginning in which two engines have to be the same
 
 
@@ -122,6 +123,13 @@ def energy(run: LogRun) -> dict[str, Value]:
     }
 
 
+def collapse(run: LogRun) -> dict[str, Value]:
+    """How many impacts of each log, and how much time, the stack of the beginning takes to come to rest."""
+    lost = run.history["dissipated_energy"]
+    row = int(np.argmax(lost >= SPENT * lost[-1]))
+    return {"impacts_to_rest": number(run.history["impacts"][row] / len(run.masses)), "time_to_rest": number(run.times[row + 1])}
+
+
 def first_impacts(run: LogRun) -> dict[str, Value]:
     """The state after the first impacts; what two engines may differ by is a share of the value, for velocities of the speed."""
     if not len(run.impacts):
@@ -167,7 +175,7 @@ def measure(replicas: Replicas) -> Measurement:
     runs = [read(replica) for replica in replicas]
     stacks, run = [loads(one, WALLS) for one in runs], runs[0]
     rest = slice(int((1.0 - REST) * len(run.times)), None)
-    piles = [{**at_rest(one, stack, rest), **energy(one), **solver_values(one)}
+    piles = [{**at_rest(one, stack, rest), **energy(one), **collapse(one), **solver_values(one)}
              for one, stack in zip(runs, stacks, strict=True)]
     values = {**together(piles), **first_impacts(run), **impact_values(runs)}
     remarks = [

@@ -11,14 +11,18 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from dembark.common.errors import DembarkError
+from dembark.input_decks.debarking_drum.debarked import force_bound
 from dembark.input_decks.debarking_drum.drum_impacts import Drum, _along_shell, estimates, read
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc import DumpError
+from dembark.postproc.impacts import COLUMNS
 from dembark.postproc.replica import Replica
 from dembark.postproc.resampling import Array
-from dembark.postproc.tests.dumps import write_times
+from dembark.postproc.tests.dumps import grains_text, write_times
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
 
 drum = module("debarking_drum")
 LOGS, TURNS, RUN_IN, SPEED = 40, 4, 1, 1.2
@@ -35,12 +39,12 @@ def derived(**changes: Any) -> dict[str, Any]:
 
 
 def replica(folder: Path, *, seed: int = 0, certificate: float = 1e-15, leak: float = 0.0, lift: float = 1.0,
-            stored: float = 0.0, hits: int = 300, speed: float = 0.5, scale: float = 1.0) -> Replica:
+            stored: float = 0.0, hits: int = 300, speed: float = 0.5, scale: float = 1.0, **changes: float) -> Replica:
     """A drum that takes POWER and loses it, but for a share `leak` that vanishes; in every quarter `hits` impacts of at least 0.1 m/s.
     `stored` (J): growth of the kinetic energy over the run; there are a third as many slow contacts, with huge forces."""
     folder.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(seed)
-    numbers = derived() | {"every": 10}
+    numbers = derived(**changes) | {"every": 10}
     rows = ROWS * (TURNS + RUN_IN)
     row, count = PERIOD / ROWS, np.arange(1, rows + 1)
     lost = POWER * (1.0 - leak) * row * count
@@ -63,11 +67,14 @@ def replica(folder: Path, *, seed: int = 0, certificate: float = 1e-15, leak: fl
     radius = numbers["inner_radius"]
     angle = np.radians(random.uniform(0.0, 90.0, len(time)))
     partner = np.where(random.random(len(time)) < 0.25, -1, 3)
+    none = 0.0 * time
     table = np.column_stack([np.ones(len(time)), partner, time, np.full(len(time), 0.005), peak, np.ones(len(time)), approach,
-                             np.ones(len(time)), -radius * np.sin(angle), 0.0 * time, -radius * np.cos(angle)])
-    np.savetxt(folder / "impacts.txt", table, fmt=["%d", "%d", *["%.12g"] * 9],
-               header="id_a id_b time duration peak_force impulse relative_speed dissipated x y z")
-    return Replica(folder, {"parameters": parameters(), "derived": numbers, "time_step": PERIOD / (10 * ROWS)})
+                             np.ones(len(time)), -radius * np.sin(angle), none, -radius * np.cos(angle), np.full(len(time), 0.5), none,
+                             none, np.ones(len(time)), random.uniform(-9.0, 9.0, len(time)), none])
+    np.savetxt(folder / "impacts.txt", table, fmt=["%d", "%d", *["%.12g"] * 15], header=" ".join(COLUMNS))
+    radii, place = np.full(LOGS, 0.09), np.column_stack([np.arange(LOGS), 0.0 * np.arange(LOGS), 0.0 * np.arange(LOGS)])
+    (folder / "grains.dump").write_text(grains_text(0, place, radii, masses=np.full(LOGS, 20.0)))
+    return Replica(folder, {"parameters": parameters(**changes), "derived": numbers, "time_step": PERIOD / (10 * ROWS)})
 
 
 @pytest.fixture(autouse=True)
@@ -94,7 +101,8 @@ def test_what_was_put_in_is_measured(tmp_path: Path) -> None:
     assert found["shell_share"]["value"] == pytest.approx(0.25, abs=0.03)
     numbers = derived()
     assert found["torque_arm"]["value"] == pytest.approx(POWER / SPEED / (numbers["load_weight"] * numbers["inner_radius"]))
-    assert names(found, "pass") == {"certificate_max", "energy_balance_error", "power_ratio", "lift_over_weight"}
+    assert names(found, "pass") == {"certificate_max", "energy_balance_error", "power_ratio", "lift_over_weight", "peak_force_over_bound"}
+    assert "debarking_degree" not in found
 
 
 def test_energy_that_is_stored_is_not_missing(tmp_path: Path) -> None:
@@ -155,6 +163,40 @@ def test_study_finds_the_exponent(tmp_path: Path) -> None:
     assert studied.profiles[0]["place"] == [0.5, 1.0, 2.0]
 
 
+SPRUCE = {"bark_force": 1000.0, "wood_force": 2718.281828, "cleared_width": 0.002}
+
+
+def test_outcome_of_debarking_is_that_of_the_forces(tmp_path: Path) -> None:
+    """Peaks are lognormal about 1000 N, and a quarter of the impacts are on the shell; all are of log 1, the rest with log 3."""
+    replicas = [replica(tmp_path / str(k), seed=k, **SPRUCE) for k in range(3)]
+    found, curves = measured(*replicas), {one["name"]: one for one in drum.measure(replicas).profiles}
+    impacts = 4 * 300 * 1.75 / LOGS
+    assert found["useful_impacts"]["value"] == pytest.approx(impacts * 0.3413, rel=0.05)
+    assert found["damaging_impacts"]["value"] == pytest.approx(impacts * 0.1587, rel=0.05)
+    assert found["damaging_share"]["value"] == pytest.approx(0.1587 / 0.5, abs=0.02)
+    assert "3 replicas" in found["debarking_degree"]["basis"]
+    # Two of the forty logs are hit, one of them at all sides.
+    assert 0.02 < found["debarking_degree"]["value"] < 2.0 / LOGS
+    assert found["debarking_time"]["value"] is None or found["debarking_time"]["value"] > 1e6
+    assert curves["debarking"]["value"][0] == 0.0
+    assert curves["debarking"]["value"][-1] == pytest.approx(100.0 * found["debarking_degree"]["value"])
+    assert np.sum(curves["effective_around"]["value"]) == pytest.approx(12.0)
+
+
+def test_forces_without_each_other_are_refused() -> None:
+    for given in ({"bark_force": 1e3}, {"wood_force": 1e3}, {"cleared_width": 1e-3}):
+        with pytest.raises(DembarkError, match="bark_force and wood_force belong together"):
+            derived(**given)
+    with pytest.raises(DembarkError, match="is not below the one that damages wood"):
+        resolve(find("debarking_drum"), changes={"bark_force": 2e3, "wood_force": 1e3})
+
+
+def test_bound_is_the_energy_of_a_fall() -> None:
+    given = parameters(drum_speed=0.0 + 1e-9, log_density=1000.0, log_diameter_max=0.2)
+    mass, fall = 1000.0 * np.pi * 0.01, 2.0 * 1.5
+    assert force_bound(given, 1.5) == pytest.approx(np.sqrt(2.0 * given["log_stiffness"] * mass * given["gravity"] * fall))
+
+
 def with_impacts(one: Drum, angle: Array, loss: Array) -> Drum:
     """`one` with impacts at `angle` (degrees) that lose `loss` (J), every other on the shell, half as much as all that is lost."""
     count, turn = len(angle), np.radians(angle)
@@ -182,5 +224,6 @@ def controls_debarking_drum(folder: Path) -> Iterator[Control]:
     with patch.object(drum, "fields", lambda _: None):
         right = measured(replica(folder / "right"))
         for name, change in {"a step that is not solved": {"certificate": 2e-10}, "a hundredth of the energy that vanishes": {"leak": 0.01},
-                             "a drum with a twelfth too much power": {"leak": 0.08}, "gravity 3 % too weak": {"lift": 0.97}}.items():
+                             "a drum with a twelfth too much power": {"leak": 0.08}, "gravity 3 % too weak": {"lift": 0.97},
+                             "forces thirty times too high": {"scale": 30.0}}.items():
             yield Control(name, right, measured(replica(folder / name, **change)))

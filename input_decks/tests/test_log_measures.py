@@ -166,6 +166,13 @@ def test_a_stack_at_rest_passes():
     assert {"lift_over_weight", "ground_share", "log_balance", "contacts_per_log", "energy_balance"} <= names(found, "pass")
 
 
+def test_impacts_until_the_stack_is_at_rest_are_counted():
+    """The energy is dissipated evenly over 200 rows: 99 % after 198, and an impact begins in each row but the first."""
+    found = of_pile(stack())
+    assert found["impacts_to_rest"]["value"] == pytest.approx(197 / 4)
+    assert found["time_to_rest"]["value"] == pytest.approx(198 * 100 * 5e-5)
+
+
 def test_rough_stakes_may_carry_a_part_of_the_weight():
     run = stack()
     found = of_pile(replace(run, parameters=run.parameters | {"stake_friction": 0.4}))["ground_share"]
