@@ -119,7 +119,7 @@ def test_the_variant_is_of_equal_grains_between_walls_at_rest() -> None:
 @pytest.mark.parametrize("engine", find("silo").engines)
 def test_a_small_bed_lies_on_its_floor(engine: str, simulate: Any) -> None:
     """Between walls at rest. The forces on the floor and the friction of the side wall carry the weight."""
-    one = simulate("silo", engine, {"grain_count": 400, "cylinder_radius": 0.04, "settle_time": 0.35, "measure_time": 0.02}, "floor")
+    one = simulate("silo", engine, {"grain_count": 400, "cylinder_radius": 0.04, "settle_time": 0.5, "measure_time": 0.02}, "floor")
     found, frame = floor.read(one), one.grains()[1]
     assert len(one.grains()) == 2 and 10 < len(found.forces) < 60 and found.change < 0.05
     assert 0.4 < found.cover < 0.95 and (found.forces > 0.9 * found.weights).mean() > 0.8
