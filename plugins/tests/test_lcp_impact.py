@@ -104,7 +104,7 @@ def test_another_time_step_goes_on(run, tmp_path):
     found = run(tmp_path, case)
     assert found.velocity()[:, 0] == pytest.approx([0.0, 1.0], abs=2e-3)
     (impact,) = found.impacts()
-    time, duration = impact[-9:-7]
+    time, duration = impact[2:4]
     assert time == pytest.approx(1e-5, abs=2e-6)
     assert duration == pytest.approx(math.pi / math.sqrt(0.5 * 1e7 / 25.0), rel=5e-3)
 
