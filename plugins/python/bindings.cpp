@@ -95,6 +95,7 @@ struct Contact {
 
 }  // namespace
 
+void bind_events(nb::module_& m);
 void bind_integration(nb::module_& m);
 void bind_lcp(nb::module_& m);
 void bind_impact(nb::module_& m);
@@ -103,6 +104,7 @@ void bind_sph(nb::module_& m);
 void bind_motion(nb::module_& m);
 
 NB_MODULE(_physics, m) {
+  bind_events(m);
   bind_integration(m);
   bind_lcp(m);
   bind_impact(m);

@@ -105,6 +105,23 @@ class PrescribedMotion {
     for (const auto& term : jolts_) shortest = std::min(shortest, 2.0 * term.duration);
     return shortest;
   }
+  /// Of the translation along a unit vector.
+  motion::Bounds bounds(const Vec3<double>& along) const {
+    motion::Bounds all;
+    all.displacement = std::fabs(dot(first_place_, along));
+    each_term(*this, [&](const auto& term) {
+      const motion::Bounds one = term.bounds(along);
+      all.displacement += one.displacement;
+      all.acceleration += one.acceleration;
+    });
+    return all;
+  }
+  /// s: the first time after t at which the velocity may jump; infinite if there is none.
+  double next_jump(double t) const {
+    double first = motion::never;
+    each_term(*this, [&](const auto& term) { first = std::min(first, term.next_jump(t)); });
+    return first;
+  }
   /// The one clear line about a time step (s) that is too long for the motion, or nothing.
   std::string step_error(double h) const {
     for (const auto& table : tables_)

@@ -26,6 +26,11 @@ namespace motion {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
+/// Of a motion along a direction, to either side, at any time.
+struct Bounds {
+  double displacement = 0.0, acceleration = 0.0;  ///< m, infinite for one that goes on; m/s^2
+};
+
 /// A function of time and its derivatives.
 struct Jet {
   double value = 0.0, first = 0.0, second = 0.0;
@@ -67,6 +72,8 @@ struct Window {
   double until = never;
   double ramps = 0.0;  ///< s, both
 
+  /// s: the first end after t; a start that was not given is none.
+  double next_end(double t) const { return given && t < start ? start : t < until ? until : never; }
   /// The motion begins. Throws std::invalid_argument for a term that ends before it starts.
   void begin(double now) {
     if (!given) start = now;
@@ -96,6 +103,13 @@ struct Oscillation {
     else hold(window.until, 1.0, to);
     hold(window.start, -1.0, to);
   }
+  Bounds bounds(const Vec3<double>& along) const {
+    const double s = dot(sine.along, along), c = dot(cosine.along, along), amplitude = std::hypot(s, c), w = two_pi * frequency;
+    if (ramp > 0.0)  // the largest derivatives of the smooth step are 15/8 and 10/sqrt(3)
+      return {amplitude, amplitude * (w * w + 3.75 * w / ramp + 5.7735026918962577 / (ramp * ramp))};
+    return {amplitude + std::fabs(s * std::sin(phase) + c * std::cos(phase)), amplitude * w * w};
+  }
+  double next_jump(double t) const { return ramp > 0.0 ? never : window.next_end(t); }
 
  private:
   Jet wave(double t, double ahead) const {
@@ -125,6 +139,11 @@ struct Uniform {
     velocity.add({s, moves ? 1.0 : 0.0, 0.0}, to);
     acceleration.add({0.5 * s * s, moves ? s : 0.0, moves ? 1.0 : 0.0}, to);
   }
+  Bounds bounds(const Vec3<double>& along) const {
+    const double a = std::fabs(dot(acceleration.along, along));
+    return {a == 0.0 && dot(velocity.along, along) == 0.0 ? 0.0 : never, a};
+  }
+  double next_jump(double t) const { return window.next_end(t); }
 };
 
 enum class PulseShape { half_sine, constant, rising };
@@ -156,6 +175,11 @@ struct Jolts {
     const double sign = k < signs.size() ? signs[k] : 0.0;
     acceleration.add({position_[k] + speed_[k] * s + sign * pulse.value, speed_[k] + sign * pulse.first, sign * pulse.second}, to);
   }
+  Bounds bounds(const Vec3<double>& along) const {
+    const double a = std::fabs(dot(acceleration.along, along));
+    return {a == 0.0 ? 0.0 : never, a};
+  }
+  double next_jump(double) const { return never; }
 
  private:
   /// Of one pulse of unit acceleration, s after its beginning.
@@ -223,6 +247,19 @@ class Table {
     to.velocity += (1.0 / width) * (chord + (1.0 - 2.0 * s) * (r * bend_a + s * bend_b) + (s * r) * (bend_b - bend_a));
     to.acceleration += (2.0 / (width * width)) * (bend_b - 2.0 * bend_a + (3.0 * s) * (bend_a - bend_b));
   }
+  /// Between two rows the acceleration is a linear function of time.
+  Bounds bounds(const Vec3<double>& along) const {
+    Bounds all;
+    for (std::size_t k = 1; k < rows_.size(); ++k) {
+      const double width = rows_[k].time - rows_[k - 1].time, chord = dot(rows_[k].displacement - rows_[k - 1].displacement, along);
+      const double bend_a = width * dot(slopes_[k - 1], along) - chord, bend_b = chord - width * dot(slopes_[k], along);
+      const double largest = std::max(std::fabs(bend_b - 2.0 * bend_a), std::fabs(bend_a - 2.0 * bend_b));
+      all.acceleration = std::max(all.acceleration, 2.0 * largest / (width * width));
+    }
+    if (all.acceleration > 0.0) all.displacement = never;
+    return all;
+  }
+  double next_jump(double) const { return never; }
 
  private:
   std::vector<TableRow> rows_;

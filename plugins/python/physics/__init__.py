@@ -6,6 +6,7 @@ All quantities are in SI units.
 from dembark.physics.adhesion import dmt_pull_off, jkr_force, jkr_loss, jkr_pull_off, jkr_rupture_distance
 from dembark.physics.capillary import CAPILLARY_MODELS, capillary_force, rupture_distance
 from dembark.physics.contact import Body, Contact, ContactForce, RollingResistance, Trajectory, collide, drop
+from dembark.physics.events import HardGrains, HardMotion, HardWall
 from dembark.physics.friction import FinnieRabinowicz, FrictionLaw, FrictionPath
 from dembark.physics.impact import Drum, Impact, ImpactChain, ImpactMotion, ImpactSystem, Plane
 from dembark.physics.integration import AdamsEvent, AdamsSolution, LocalErrors, integrate_adams, local_errors
@@ -32,6 +33,9 @@ __all__ = [
     "FinnieRabinowicz",
     "FrictionLaw",
     "FrictionPath",
+    "HardGrains",
+    "HardMotion",
+    "HardWall",
     "Impact",
     "ImpactChain",
     "ImpactMotion",

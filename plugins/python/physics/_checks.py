@@ -35,9 +35,9 @@ def numbers(name: str, value: ArrayLike, unit: str, *, low: float = -np.inf, hig
     if bad.any():
         first = array[bad].flat[0]
         if low == -np.inf and high == np.inf:
-            raise ValueError(f"{name} must be a {'' if infinite else 'finite '}number ({unit}), not {first:g}")
+            raise ValueError(f"{name} must be a {'' if infinite else 'finite '}number{f' ({unit})' if unit else ''}, not {first:g}")
         bound = f"> {low:g}" if low_open else f">= {low:g}" if high == np.inf else f"between {low:g} and {high:g}"
-        raise ValueError(f"{name} must be {bound} {unit}{'' if infinite else ' and finite'}, not {first:g}")
+        raise ValueError(f"{name} must be {f'{bound} {unit}'.rstrip()}{'' if infinite else ' and finite'}, not {first:g}")
     return array
 
 
