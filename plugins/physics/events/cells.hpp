@@ -43,7 +43,7 @@ class Cells {
   void set(const std::array<Period, 3>& periods, const Vector& low, const Vector& high, double side, int dimension, int n) {
     double volume = 1.0;
     for (int a = 0; a < dimension; ++a) volume *= std::max(extent(periods[a], low, high, a), side);
-    const double wanted = std::max(side, std::pow(volume / n, 1.0 / dimension));
+    const double wanted = std::max(side, 0.75 * std::pow(volume / n, 1.0 / dimension));
     for (int a = 0; a < 3; ++a) {
       const double length = extent(periods[a], low, high, a);
       periodic_[a] = periods[a].repeats();

@@ -40,6 +40,7 @@ class Flights {
     auto fields() { return std::tie(x, v, time, radius); }
   };
   struct State {
+    int number = 0;  ///< of the grain: those of a cell lie next to each other in memory
     double mass = 1.0;
     Vector spin{};
     double last = -never;  ///< s, of its last collision
@@ -52,8 +53,8 @@ class Flights {
     std::uint32_t partner_changes = 0;
     int axis = 0, side = 1;  ///< of the face
     auto fields() {
-      return std::tie(mass, spin, last, hurried, turns[0], turns[1], turns[2], place[0], place[1], place[2], changes, contact, leave,
-                      partner, partner_changes, axis, side);
+      return std::tie(number, mass, spin, last, hurried, turns[0], turns[1], turns[2], place[0], place[1], place[2], changes, contact,
+                      leave, partner, partner_changes, axis, side);
     }
   };
 
@@ -68,6 +69,7 @@ class Flights {
     states_.resize(grains.size());
     for (std::size_t i = 0; i < grains.size(); ++i) {
       moving_.push_back({grains[i].position, grains[i].velocity, 0.0, grains[i].radius});
+      states_[i].number = int(i);
       states_[i].mass = grains[i].mass;
       states_[i].spin = grains[i].spin;
       largest_ = std::max(largest_, grains[i].radius);
@@ -124,9 +126,31 @@ class Flights {
     }
     cells_.set(settings_.periods, low, high, 2.0 * largest_ * (1.0 + 1e-9), settings_.dimension, n);
     for (int i = 0; i < n; ++i) states_[i].place = cells_.place(moving_[i].x);
+    sort();
     fill();
     events_.reset(n);
     for (int i = 0; i < n; ++i) predict(i);
+  }
+
+  /// In the order of the cells.
+  void sort() {
+    std::vector<std::pair<int, int>> order;
+    for (int i = 0; i < size(); ++i) order.emplace_back(cells_.number(states_[i].place), i);
+    std::sort(order.begin(), order.end());
+    const std::vector<Moving> moving(std::move(moving_));
+    const std::vector<State> states(std::move(states_));
+    moving_.clear();
+    states_.clear();
+    for (const auto& [cell, i] : order) {
+      moving_.push_back(moving[i]);
+      states_.push_back(states[i]);
+    }
+    index();
+  }
+  /// Where each grain is.
+  void index() {
+    index_.resize(states_.size());
+    for (int i = 0; i < size(); ++i) index_[states_[i].number] = i;
   }
 
   /// Lists of the cells, and which walls the grains in each of them may touch.
@@ -150,13 +174,14 @@ class Flights {
       for (std::size_t k = 0; k < settings_.walls.size(); ++k) {
         const double gap = dot(m.x - settings_.walls[k].point, settings_.walls[k].normal) - m.radius;
         if (gap < -1e-12 * m.radius)
-          throw std::invalid_argument("grain " + std::to_string(i) + " is " + number_text(-gap) + " m inside wall " + std::to_string(k) +
-                                      " at the start");
+          throw std::invalid_argument("grain " + std::to_string(states_[i].number) + " is " + number_text(-gap) + " m inside wall " +
+                                      std::to_string(k) + " at the start");
       }
       each_near(i, all, [&](int j, const Vector& shift) {
+        const int one = states_[i].number, other = states_[j].number;
         const double reach = m.radius + moving_[j].radius, gap = norm(m.x - moving_[j].x - shift) - reach;
         if (gap < -1e-12 * reach)
-          throw std::invalid_argument("grains " + std::to_string(std::min(i, j)) + " and " + std::to_string(std::max(i, j)) +
+          throw std::invalid_argument("grains " + std::to_string(std::min(one, other)) + " and " + std::to_string(std::max(one, other)) +
                                       " overlap by " + number_text(-gap) + " m at the start");
       });
     }
@@ -268,6 +293,7 @@ class Flights {
   std::vector<motion::Bounds> bounds_;
   std::vector<Moving> moving_;
   std::vector<State> states_;
+  std::vector<int> index_;
   Cells cells_;
   std::vector<std::uint64_t> near_walls_;  ///< a bit each, of the cells
   Tournament events_;

@@ -56,7 +56,8 @@ class Solver : public Flights {
   double time() const { return time_; }  ///< s
   const Account& account() const { return account_; }
   /// A grain now, its position without the jumps from one end of a period to the other.
-  Grain grain(int i) const {
+  Grain grain(int number) const {
+    const int i = index_[number];
     const Moving& m = moving_[i];
     const State& s = states_[i];
     const double t = time_ - base_ - m.time;
@@ -79,11 +80,11 @@ class Solver : public Flights {
   double overlap() const {
     double largest = -never;
     for (int i = 0; i < size(); ++i) {
-      const Grain g = grain(i);
+      const Grain g = grain(states_[i].number);
       for (const Wall& wall : settings_.walls)
         largest = std::max(largest, -Flight{time_, g.position, g.velocity, gravity_, g.radius}.to(wall, time_).gap);
       each_near(i, all, [&](int j, const Vector&) {
-        const Grain other = grain(j);
+        const Grain other = grain(states_[j].number);
         largest = std::max(largest, g.radius + other.radius - norm(nearest(g.position - other.position)));
       });
     }
@@ -95,8 +96,8 @@ class Solver : public Flights {
     now_ = std::max(now_, time_ - base_);
     for (int i = 0; i < size(); ++i) {
       advance(i);
-      moving_[i].v = velocities[i];
-      states_[i].spin = spins[i];
+      moving_[i].v = velocities[states_[i].number];
+      states_[i].spin = spins[states_[i].number];
     }
     refresh();
   }
@@ -154,7 +155,7 @@ class Solver : public Flights {
     ++s.changes;
     if (s.hurried < 1000) return;
     s.hurried = 0;
-    throw std::runtime_error("inelastic collapse at " + number_text(time_, 9) + " s: grain " + std::to_string(i) +
+    throw std::runtime_error("inelastic collapse at " + number_text(time_, 9) + " s: grain " + std::to_string(s.number) +
                              " collides without end; set contact_duration (s)");
   }
 
@@ -214,16 +215,22 @@ class Solver : public Flights {
       refuse("is that of other grains or walls");
     const auto finite = [](const Vector& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     bool good = cells_.complete(settings_.periods, int(n)) && std::isfinite(base_) && std::isfinite(now_) && std::isfinite(time_);
+    std::vector<bool> there(n, false);
     for (std::size_t i = 0; i < n && good; ++i) {
       const State& s = states_[i];
       const Moving& m = moving_[i];
-      if (s.mass != before.states_[i].mass || m.radius != before.moving_[i].radius) refuse("is that of other grains");
+      good = s.number >= 0 && s.number < int(n) && !there[s.number];
+      if (!good) break;
+      there[s.number] = true;
+      const int was = before.index_[s.number];
+      if (s.mass != before.states_[was].mass || m.radius != before.moving_[was].radius) refuse("is that of other grains");
       for (int a = 0; a < 3; ++a) good &= s.place[a] >= 0 && s.place[a] < cells_.cells(a);
       good &= finite(m.x) && finite(m.v) && finite(s.spin) && std::isfinite(m.time) && s.axis >= 0 && s.axis < 3 && std::abs(s.side) == 1 &&
               s.partner >= -1 - int(settings_.walls.size()) && s.partner < int(n) && s.partner != int(i) && s.contact >= now_ &&
               s.leave >= now_ && (s.leave == never || cells_.open(s.axis, s.place[s.axis], s.side));
     }
     if (!good) refuse("is incomplete or damaged");
+    index();
     fill();
     events_.reset(int(n));
     for (std::size_t i = 0; i < n; ++i) events_.set(int(i), std::min(states_[i].contact, states_[i].leave));
