@@ -1,4 +1,4 @@
-"""The commands `dembark fields`, `dembark walls` and `dembark debark`."""
+"""The commands `dembark fields`, `dembark walls`, `dembark debark` and `dembark render`."""
 
 from __future__ import annotations
 
@@ -19,12 +19,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from dembark.common.errors import DembarkError, Interrupted
 from dembark.common.extras import missing_extra
+from dembark.common.files import write_atomic
+from dembark.common.units import to_si
 
-from .cli_options import contact_columns, frame_numbers, length, positive, removal_force
+from .cli_options import contact_columns, frame_numbers, length, parse_wall, picture_size, positive, removal_force, value_range
 from .contacts import ContactColumnsError
 from .dumps.frames import ColumnsError, DensityError, DumpError, DumpWarning
 from .grains import GrainFrame
-from .sources import mean_diameter, open_source, select
+from .sources import frames_at, mean_diameter, open_source, select
+from .style import SEQUENTIAL
+from .walls import Inclusion, Wall
 from .walls.run import WallLoads, wall_lines
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
@@ -45,6 +49,8 @@ Units = Annotated[str, typer.Option(help="Unit style of dumps that do not name i
 Walls = Annotated[list[str] | None, typer.Option("--wall", metavar="NAME:KIND[:KEY=VALUE...]", help=(
     "A wall, by the name of its columns f_force_NAME[1..3]; repeat for more. side:cylinder:radius=25mm, base:plane:normal=z, "
     "lid:mesh:file=lid.stl:unit=mm, stone:inclusion:ids=1,5-9. Default: the walls of the run's record."))]
+Time = Annotated[list[float] | None, typer.Option("--at", parser=lambda text: to_si(text, "s", "--at"), metavar="TIME", help=(
+    "Time of a picture, '0.98 s', the nearest frame; repeat for more. Default: the last frame."))]
 Plot = Annotated[Path | None, typer.Option(metavar="FOLDER", help="Draw plots (PNG) into this folder.")]
 
 
@@ -117,7 +123,8 @@ def fields(
         chosen, kernel=kernel, width=width, grid=grid, spacing=spacing, box=box, average=average, walls=wall or (), cells=cells,
         least_contacts=least_contacts, only=only, threads=threads, show=progress)
     about = _provenance("fields", source)
-    with progress("fields", len(chosen.numbers)) as advance, (TimeSeries(grains, about) if grains else nullcontext()) as points:
+    opening = TimeSeries(grains, about, spheres=True) if grains else nullcontext()
+    with progress("fields", len(chosen.numbers)) as advance, opening as points:
         def done(frame: GrainFrame, time: float) -> None:
             if points:
                 add_grains(points, frame, time)
@@ -254,7 +261,75 @@ def debark(
     _say([*lines(results), *(f"written: {path}" for path in written)])
 
 
-def _check_places(out: Path | None, *collections: Path | None, plot: Path | None, read: Iterable[Path | None]) -> None:
+@app.command()
+def render(
+    source: SourceArgument,
+    at: Time = None,
+    frames: Annotated[str | None, typer.Option(help="Frames instead of times, from 0, as in Python: 10:50, ::5, -1.")] = None,
+    film: Annotated[bool, typer.Option("--film", help="One film of all frames, or of those of --frames.")] = False,
+    rate: Annotated[float, typer.Option(min=0.1, max=100.0, help="Frames of the film a second.")] = 15.0,
+    view: Annotated[str, typer.Option(help=(
+        "front, back, side, top, iso, or the direction to the eye: 1,-1,0.5; default: the face of a layer, else iso."))] = "",
+    colour_by: Annotated[str, typer.Option(help=(
+        "velocity, velocity:z, diameter, type, mass, force, angular_velocity, position:z, force_of_WALL, a column of the dump, or of "
+        "contacts: contact_force, contact_count, pressure; default: velocity."))] = "",
+    unit: Annotated[str, typer.Option(help="Unit of the colour scale: mm/s.")] = "",
+    span: Annotated[str | None, typer.Option("--range", metavar="LOW,HIGH", help=(
+        "Ends of the colour scale, in its unit; default: without the 2 % of the values at either end."))] = None,
+    colours: Annotated[str, typer.Option(help="A colour map of matplotlib.")] = SEQUENTIAL,
+    surface: Annotated[bool, typer.Option("--surface", help="Draw the particles of a fluid by their surface.")] = False,
+    cut: Annotated[bool, typer.Option("--cut", help="Leave out the half that is nearer to the eye.")] = False,
+    wall: Walls = None,
+    bare: Annotated[bool, typer.Option("--no-walls", help="Draw no walls.")] = False,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Pixels; default: as the run is shaped, at most 1200x900.")] = None,
+    out: Annotated[Path | None, typer.Option(help=(
+        "File: .png, .jpg, .webp; a film .webp, .gif. Of several pictures, names have the times. Default: name of the run."))] = None,
+    contacts: Contacts = None,
+    time_step: TimeStep = None,
+    density: Density = None,
+    columns: Columns = None,
+    contact_columns: ContactColumns = None,
+    units: Units = "",
+) -> None:
+    """Draw pictures or a film of the grains, the surface of water, walls and bodies."""
+    from . import render as drawing
+    from .pictures.scenes import Album, Look
+
+    if at and (frames or film):
+        raise DembarkError("--at is for pictures of single times", "", "leave --frames and --film out")
+    suffixes = drawing.FILMS if film else drawing.STILLS
+    place = out or Path(f"{source.resolve().name.split('.')[0]}{suffixes[0]}")
+    if place.suffix not in suffixes:
+        raise DembarkError(f"{place.name} does not end in {', '.join(suffixes)}", "in --out", "take one of these")
+    _check_places(place, read=(source, contacts))
+    drawing.View.named(view or "iso")
+    look = Look(colour_by, unit, value_range(span) if span else None, colours=colours, view=view, cut=cut, surface=surface, walls=not bare,
+                size=picture_size(size) if size else None)
+    opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
+                         contact_columns=contact_columns, units=units)
+    numbers = frames_at(opened, at) if at else frame_numbers(frames or (":" if film else "-1"), len(opened.grains))
+    chosen = select(opened, numbers)
+    album = Album(chosen.source, numbers, look, [_drawn(parse_wall(text, chosen.diameter).wall) for text in wall or ()])
+    written = []
+    with progress("render", len(numbers)) as advance:
+        if film:
+            written.append(drawing.write_film(place, album, 1000.0 / rate, advance))
+        else:
+            for number, (time, image) in zip(numbers, album, strict=True):
+                mark = f"{time:.6g}s" if opened.timed else f"{number}"
+                file = place if len(numbers) == 1 else place.with_stem(f"{place.stem}-{mark}")
+                written.append(write_atomic(file, drawing.still(image, file.suffix)))
+                advance()
+    _say([*chosen.lines([]), *(f"note: {one}" for one in album.notes), *(f"written: {path}" for path in written)])
+
+
+def _drawn(wall: Wall | Inclusion) -> Wall:
+    if isinstance(wall, Inclusion):
+        raise DembarkError(f"{wall.name} is an inclusion", "in --wall", "its grains are drawn as they are; leave it out")
+    return wall
+
+
+def _check_places(out: Path | None, *collections: Path | None, plot: Path | None = None, read: Iterable[Path | None]) -> None:
     """DembarkError when an output cannot be where it shall be, or two are the same file, or one is a file that is `read`."""
     sources = [file for path in read if path for file in (path, *path.glob("*.dump"), *path.parent.glob(path.name)) if file.is_file()]
     given = [path for path in (out, *collections) if path is not None]

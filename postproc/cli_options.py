@@ -25,6 +25,7 @@ _KINDS: Mapping[str, tuple[str, ...]] = {
     "inclusion": ("ids", "surface", "radius", "axis", "around", "along", "patch"),
 }
 _MOST_IDS = 10_000_000  # of an inclusion
+_MOST_PIXELS = 8000  # along a side of a picture
 _ORIGIN, _UPWARD = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 # Units of length that STL files come in, in m.
 STL_UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
@@ -85,6 +86,27 @@ def span(text: str, diameter: float, what: str) -> tuple[float, float]:
     ends = [_place(part, diameter, what) for part in text.split(",")]
     if len(ends) != 2 or not ends[0] < ends[1]:
         raise DembarkError(f"{text!r} is not a range", f"in {what}", "give two rising numbers, such as 0,50mm")
+    return ends[0], ends[1]
+
+
+def picture_size(text: str) -> tuple[int, int]:
+    """Width and height in pixels: `1200x900`."""
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
+    size = (int(match.group(1)), int(match.group(2))) if match else (0, 0)
+    if not 100 <= min(size) <= max(size) <= _MOST_PIXELS:
+        raise DembarkError(f"{text!r} is not the size of a picture", "in --size",
+                           f"give width and height, 1200x900, each from 100 to {_MOST_PIXELS}")
+    return size
+
+
+def value_range(text: str) -> tuple[float, float]:
+    """Two rising numbers, `0,0.5`."""
+    try:
+        ends = [finite(float(part), "--range", part) for part in text.split(",")]
+    except ValueError:
+        ends = []
+    if len(ends) != 2 or not ends[0] < ends[1]:
+        raise DembarkError(f"{text!r} is not a range", "in --range", "give two rising numbers in the unit of the scale, such as 0,0.5")
     return ends[0], ends[1]
 
 

@@ -121,6 +121,22 @@ def open_source(path: Path, contacts: Path | None = None, *, time_step: float | 
     return Source(path, grains, touching, time_step, record)
 
 
+def frames_at(source: Source, times: Sequence[float]) -> list[int]:
+    """Numbers of the frames nearest to `times` (s), each once; DembarkError where the run has no frame near one of them."""
+    if not source.timed:
+        raise DembarkError("the times of the frames are not known", f"{source.path}", "give --time-step")
+    said, found = source.grains.times, []
+    known = np.where(np.isfinite(said), said, source.grains.steps * source.time_step)
+    between = float(np.median(np.diff(known))) if len(known) > 1 else 0.0
+    for time in times:
+        if not known.min() - 0.5 * between - 1e-9 <= time <= known.max() + 0.5 * between + 1e-9:
+            raise DembarkError(f"there is no frame at {time:g} s", "in --at",
+                               f"the frames are from {known.min():.6g} to {known.max():.6g} s")
+        number = int(np.abs(known - time).argmin())
+        found += [number] if number not in found else []
+    return found
+
+
 def _run_folder(path: Path) -> Path | None:
     if not path.is_dir():
         return None

@@ -45,7 +45,7 @@ RUNNERS = {
     "{toctree}": "make docs", "listing": "test_listing", "template": "test_case_template.py", "picture": "test_architecture.py",
 }
 # Pages whose commands README.md and the page of restarts have in a similar form.
-LONG = {f"docs/how-to/{page}.md" for page in ("fields", "campaigns", "moving_walls")}
+LONG = {f"docs/how-to/{page}.md" for page in ("fields", "pictures", "campaigns", "moving_walls")}
 SHELL_PAGES = [pytest.param(page, id=page, marks=pytest.mark.full if page in LONG else ())
                for page in dict.fromkeys(block.page for block in blocks("shell"))]
 

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
+from dembark.postproc.pictures import water
 from dembark.postproc.tests.packings import frame_of
+from dembark.validation.case import folders, walls
 
 dam = module("dam_break_cubes")
 DT, STRIDE, SPACING = 1e-3, 100, 0.025
@@ -200,6 +202,14 @@ def test_six_cubes_stand_upright_at_first(engine: str, simulate: Any) -> None:
         assert place[0] == pytest.approx(0.375, abs=p["cube_noise"] + 1e-4)
     heights = sorted(float(rows[f"cube{k}_z"][0]) for k in range(1, 7))
     np.testing.assert_allclose(heights, [0.075, 0.075, 0.075, 0.225, 0.225, 0.375], atol=1e-3)
+    # Pictures have them there, too.
+    record = walls.resolved(folders.find("dam_break_cubes"), {**p, **one.derived})
+    drawn = water.boxes(one.folder, record, np.zeros(1, np.int64))
+    assert len(drawn) == 6
+    for k in range(1, 7):
+        corners = drawn[f"cube{k}"].reshape(-1, 3)
+        np.testing.assert_allclose(corners.mean(axis=0), [rows[f"cube{k}_{axis}"][0] for axis in "xyz"], atol=1e-9)
+        np.testing.assert_allclose(np.ptp(corners, axis=0), 0.15, atol=1e-3)
 
 
 def controls_dam_break_cubes(_folder: Path) -> Iterator[Control]:

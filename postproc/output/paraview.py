@@ -1,7 +1,7 @@
 """Fields, wall patches and grains for ParaView: a collection `<name>.pvd` of times, whose VTK files are in the folder `<name>_pvd`.
 
-Fields are images with one value a cell (.vti); walls are polygons and grains are points with `radius` (.vtp). The formats have no place
-for units: they are text in the field data, `units`, a line for each array.
+Fields are images with one value a cell (.vti); walls are polygons and grains are points with `radius` (.vtp), which the script
+`<name>_pvd.py` shows as spheres. The formats have no place for units: they are text in the field data, `units`, a line for each array.
 """
 
 from __future__ import annotations
@@ -34,6 +34,35 @@ _SUFFIXES = (".vti", ".vtp")
 _GRAINS = {"ids": ("id", "1"), "types": ("type", "1"), "radii": ("radius", "m"), "masses": ("mass", "kg"),
            "velocities": ("velocity", "m s-1"), "omegas": ("angular_velocity", "rad s-1"), "forces": ("force", "N")}
 
+# What ParaView does to show grains, for its --script or File, Load State.
+_SPHERES = '''"""Grains as spheres of their size: paraview --script={script}, or File, Load State."""
+
+from pathlib import Path
+
+from paraview.simple import *
+
+here = Path(globals().get("__file__") or {place!r})
+grains = PVDReader(registrationName="grains", FileName=str(here.with_name({name!r})))
+grains.UpdatePipeline()
+spheres = Glyph(registrationName="spheres", Input=grains, GlyphType="Sphere")
+spheres.GlyphType.ThetaResolution = spheres.GlyphType.PhiResolution = 16
+spheres.GlyphMode = "All Points"
+spheres.OrientationArray = ["POINTS", "No orientation array"]
+spheres.ScaleArray = ["POINTS", "radius"]
+spheres.ScaleFactor = 2.0  # ParaView's sphere has the diameter 1
+view = GetActiveViewOrCreate("RenderView")
+shown = Show(spheres, view)
+has_velocity = grains.PointData.GetArray("velocity") is not None
+ColorBy(shown, ("POINTS", "velocity", "Magnitude") if has_velocity else ("POINTS", "radius"))
+scene = GetAnimationScene()
+scene.UpdateAnimationUsingDataTimeSteps()
+scene.GoToLast()
+shown.RescaleTransferFunctionToDataRange(False, True)
+shown.SetScalarBarVisibility(view, True)
+view.ResetCamera()
+Render(view)
+'''
+
 
 class TimeSeries:
     """A collection that grows by one time with each `add`.
@@ -41,10 +70,11 @@ class TimeSeries:
     The files are written into a hidden folder. Leaving the `with` block moves them into place and writes `path`; an error removes them.
     """
 
-    def __init__(self, path: str | Path, attributes: Attributes | None = None) -> None:
-        """DembarkError when `path` is no place for a collection, see `check_place`."""
+    def __init__(self, path: str | Path, attributes: Attributes | None = None, spheres: bool = False) -> None:
+        """`spheres`: they are grains, and a script shows them. DembarkError when `path` is no place for a collection, see `check_place`."""
         self.path = check_place(Path(path))
         self._attributes = dict(attributes or {})
+        self._spheres = spheres
         self._work = self.path.with_name(f".{_folder(self.path).name}.part-{os.getpid()}")
         self._entries: list[str] = []
 
@@ -83,6 +113,10 @@ class TimeSeries:
                          "</Collection>", "</VTKFile>", ""]
                 move_into_place(self._work, _folder(self.path))
                 write_atomic(self.path, "\n".join(lines).encode())
+                if self._spheres:
+                    script = _folder(self.path).with_suffix(".py")
+                    text = _SPHERES.format(script=script.name, place=str(script.resolve()), name=self.path.name)
+                    write_atomic(script, text.encode())
         except OSError as refused:
             raise disk_error(refused, self.path) from None
         finally:
@@ -123,11 +157,11 @@ def write_fields(path: str | Path, data: xarray.Dataset, attributes: Attributes 
 
 
 def write_grains(path: str | Path, frames: Iterable[GrainFrame], time_step: float = 1.0, attributes: Attributes | None = None) -> Path:
-    """Write grains as points, one frame at a time; in ParaView: Glyph, spheres, scaled by 2 `radius`. Returns the path.
+    """Write grains as points, one frame at a time, and a script that shows them as spheres. Returns the path.
 
     `time_step` (s) turns steps into times of frames that have none.
     """
-    with TimeSeries(path, attributes) as file:
+    with TimeSeries(path, attributes, spheres=True) as file:
         for frame in frames:
             add_grains(file, frame, frame.time_by(time_step))
     return Path(path)

@@ -28,7 +28,8 @@ def draw(folder: Path, wanted: Mapping[str, Any] | None) -> list[str]:
     if not wanted:
         return []
     try:
-        from . import packings, sections
+        from ..render import still
+        from . import scenes, sections
     except ModuleNotFoundError as error:
         return [f"No picture: {missing_extra(error, 'it')}."]
     replica = next(iter(sorted(folder.glob("replica-*/grains.dump"))), None)
@@ -41,7 +42,7 @@ def draw(folder: Path, wanted: Mapping[str, Any] | None) -> list[str]:
             if len(scene.times) > 2:
                 sections.animate(scene, folder / ANIMATION)
         else:
-            image = packings.picture(replica.parent, **wanted)
+            image = still(scenes.picture(replica.parent, wanted), ".png")
     except Exception as error:  # noqa: BLE001 - the measurement does without it
         return [f"No picture: {error if isinstance(error, DembarkError) else f'{type(error).__name__}: {error}'}."]
     write_atomic(folder / PICTURE, image)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,18 +16,18 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
-from PIL import Image
 
 from dembark.common.files import read_json
 
 from .. import DumpError, GrainFrame, GrainsDump
 from ..dumps import TextDump
 from ..history import read_times
+from ..render import pixels, write_film
 from ..style import GREY, SEQUENTIAL, STYLE
 from ..walls.mesh import cut, read_stl
 from . import saved
-from .packings import HEIGHT
 
+HEIGHT = 3.3  # inches
 _DOTS = 100  # an inch of an animation
 _CHAIN = "#d55e00"
 Array = NDArray[np.float64]
@@ -175,8 +175,13 @@ def _last(axes: Axes, section: Section) -> None:
 
 def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
     """All frames as a GIF at `path`, each for `duration` ms; marks on the shell turn with the drum. Returns `path`."""
+    return write_film(path, _pictures(section), duration, colours=32)
+
+
+def _pictures(section: Section) -> Iterator[tuple[float, NDArray[np.uint8]]]:
+    """Time (s) and picture of each frame."""
     left, right, bottom, upper = section.view
-    scale, top, images = section.pixels / max(right - left, upper - bottom) / _DOTS, limit(section), []
+    scale, top = section.pixels / max(right - left, upper - bottom) / _DOTS, limit(section)
     for number, time in enumerate(section.times):
         figure = Figure(figsize=((right - left) * scale, (upper - bottom) * scale), dpi=_DOTS)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -186,6 +191,4 @@ def animate(section: Section, path: Path, *, duration: int = 60) -> Path:
             marks = section.drum_radius * np.column_stack([np.cos(angles), np.sin(angles)])
             axes.add_collection(LineCollection(list(np.stack([marks, 1.035 * marks], axis=1)), colors=GREY, linewidths=1.2))
         axes.set(xlim=(left, right), ylim=(bottom, upper))
-        images.append(Image.open(io.BytesIO(saved(figure, dots=_DOTS))).convert("RGB").quantize(32))
-    images[0].save(path, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
-    return path
+        yield time, pixels(figure)

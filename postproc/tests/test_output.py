@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -216,3 +218,35 @@ def test_full_disk_is_one_line(tmp_path, monkeypatch, write):
     with pytest.raises(RunError, match="the disk is full"):
         write(tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_paraview_is_told_to_show_spheres_of_their_size(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_grains("grains.pvd", [frame_of([[0.0, 0.0, 0.0]], 0.25)])
+    asked = {}
+
+    class Anything:
+        def __init__(self, name):
+            self.__dict__["name"] = name
+
+        def __getattr__(self, name):
+            return Anything(f"{self.name}.{name}")
+
+        def __setattr__(self, name, value):
+            asked[f"{self.name}.{name}"] = value
+
+        def __call__(self, *args, **words):
+            asked[self.name] = (args, words)
+            return Anything(self.name)
+
+    simple = ModuleType("paraview.simple")
+    names = "PVDReader Glyph GetActiveViewOrCreate Show ColorBy GetAnimationScene Render".split()
+    simple.__dict__.update({name: Anything(name) for name in names})
+    monkeypatch.setitem(sys.modules, "paraview", ModuleType("paraview"))
+    monkeypatch.setitem(sys.modules, "paraview.simple", simple)
+    exec(compile(Path("grains_pvd.py").read_text(encoding="utf-8"), "script", "exec"), {})
+    assert asked["PVDReader"][1]["FileName"] == str(Path("grains.pvd").resolve())
+    assert asked["Glyph"][1]["GlyphType"] == "Sphere" and asked["Glyph.ScaleArray"] == ["POINTS", "radius"]
+    # ParaView's sphere has the radius 0.5.
+    assert 0.5 * asked["Glyph.ScaleFactor"] == 1.0 and asked["Glyph.GlyphMode"] == "All Points"
+    assert asked["ColorBy"][0][1][:2] == ("POINTS", "velocity")

@@ -1,4 +1,4 @@
-"""Figures show what the fields hold; rendered pictures show the grains in their colours."""
+"""Figures show what the fields hold."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from packings import contacts_of, frame_of
 from PIL import Image
 
 from dembark.common.errors import DembarkError, RunError
-from dembark.postproc import plots, render
+from dembark.postproc import plots
 from dembark.postproc.fields.coarse_graining import coarse_grain
 from dembark.postproc.fields.grid import Grid
-from dembark.postproc.pictures import saved
 from dembark.postproc.walls import CylinderWall, MeshWall, PlaneWall
 from dembark.postproc.walls.patches import box_patches, mesh_patches
 from dembark.postproc.walls.stress import wall_stress
@@ -102,26 +101,3 @@ def test_all_figures_can_be_saved(packing, tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises((DembarkError, RunError)):
         plots.save(tmp_path / "file", figures)
-
-
-def test_rendered_grains_have_their_colours(packing, monkeypatch):
-    monkeypatch.delenv("DISPLAY", raising=False)
-    frame, _ = packing
-    low, high = (render.grain_scene(frame, np.full(64, value), "value") for value in (0.0, 1.0))
-    images = [render.render(one, (0.0, 1.0), pixels=100) for one in (low, high)]
-    colours = [image[np.any(image < 250, axis=2)].mean(axis=0) for image in images]
-    # Cividis goes from blue to yellow.
-    assert colours[0][2] > colours[0][0] and colours[1][0] > colours[1][2]
-    assert images[0].shape == images[1].shape
-    monkeypatch.setattr(render, "render", lambda *_: images[0])
-    assert len(saved(render.picture(low, height=2.0))) > 10_000
-
-
-def test_nothing_to_render_and_a_renderer_that_fails_give_one_line(packing, monkeypatch):
-    nothing = render.grain_scene(frame_of(np.zeros((0, 3))))
-    assert render.limits(nothing) == (0.0, 1.0)
-    with pytest.raises(RunError, match="nothing to render"):
-        render.render(nothing, (0.0, 1.0))
-    monkeypatch.setattr(render.sys, "executable", "/bin/false")
-    with pytest.raises(RunError, match="ended with code 1"):
-        render.render(render.grain_scene(packing[0]), (0.0, 1.0))

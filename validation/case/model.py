@@ -24,6 +24,9 @@ STANDARD_OUTPUTS = ("grains", "contacts", "times")
 PROFILES = ("quick", "standard", "full")
 # Kinds of evidence: what a reference is.
 EVIDENCE = ("experiment", "theory", "code", "identity")
+# What the words of [picture] may be; the quantities are those of every dump, also by component, `velocity:z`.
+PICTURE_WORDS = {"cross_section": ("xz", "xy"), "view": ("front", "back", "side", "top", "iso"),
+                 "colour_by": ("velocity", "force", "angular_velocity", "diameter", "type", "contact_force", "contact_count", "pressure")}
 UNSET = "auto"
 # The formal order of a scheme of which nothing else is said.
 FIRST_ORDER = Expression("1")
@@ -206,8 +209,7 @@ class Case:
 
     def picture_of(self, values: Mapping[str, Value]) -> dict[str, Any] | None:
         """How the report shows a run with these parameters and derived numbers: [picture] with its expressions evaluated; None without."""
-        words = ("cross_section", "colour_by")
-        return {key: Expression(value)(values) if isinstance(value, str) and key not in words else value
+        return {key: Expression(value)(values) if isinstance(value, str) and key not in PICTURE_WORDS else value
                 for key, value in self.picture.items()} or None
 
     def missing_capabilities(self, engine: str, values: Mapping[str, Value]) -> list[str]:

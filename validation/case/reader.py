@@ -20,6 +20,7 @@ from .model import (
     EVIDENCE,
     FIRST_ORDER,
     OUTPUTS,
+    PICTURE_WORDS,
     PROFILES,
     STANDARD_OUTPUTS,
     Case,
@@ -39,11 +40,11 @@ _CASE: dict[str, Types] = {
     "title": str, "description": str, "source": list, "engines": list, "outputs": list, "particles": str, "groups": list,
     "references": list, "paired": bool, "rates": dict}
 _RUN: dict[str, Types] = {"variant": str, "variants": list, "engines": list, "replicas": dict}
-# Keys of [picture]: of a cross-section, and of a packing in perspective.
+# Keys of [picture]: of a cross-section, and of a packing.
 _NUMBER: Types = (int, float, str)
 _SECTION: dict[str, Types] = {"cross_section": str, "drum_radius": _NUMBER, "drum_speed": _NUMBER, "speed": _NUMBER, "frames": int,
                               "chains": bool, "last": int, "pixels": int}
-_PACKING: dict[str, Types] = {"colour_by": str, "scale": _NUMBER, "cut": bool, "radius": _NUMBER}
+_PACKING: dict[str, Types] = {"colour_by": str, "scale": _NUMBER, "view": str, "cut": bool, "surface": bool}
 
 
 @cache
@@ -282,10 +283,13 @@ class CaseReader(TableReader):
         if not data:
             return {}
         section = "cross_section" in data
-        self.table(data, "picture", _SECTION if section else _PACKING, ("cross_section",) if section else ("colour_by", "scale"))
-        key, known = ("cross_section", ("xz", "xy")) if section else ("colour_by", ("velocity", "force", "stress"))
-        self.pick(data[key], known, key, "picture")
-        for one in data.keys() - {key}:
+        self.table(data, "picture", _SECTION if section else _PACKING, ())
+        for key, known in PICTURE_WORDS.items():
+            if key in data:
+                self.pick(data[key].removesuffix(":x").removesuffix(":y").removesuffix(":z"), known, key, "picture")
+        if not data.keys() & {"cross_section", "colour_by", "surface"}:
+            raise self.fail("picture", "colour_by is missing", "say what grains are coloured by, or surface = true for a fluid")
+        for one in data.keys() - PICTURE_WORDS.keys():
             if isinstance(data[one], str):
                 try:
                     Expression(data[one])

@@ -1,8 +1,9 @@
-"""[walls] of a case.toml: where the walls of a run are, for `dembark fields` and `dembark walls`, which know no case.
+"""[walls] of a case.toml: where the walls of a run are, for `dembark fields`, `walls` and `render`, which know no case.
 
 A wall is named after its columns f_force_<name> in the dump. It is a plane (`origin`, `normal` to the grains) or a cylinder about an axis
-(`origin`, `axis`, `radius`), at rest or with a steady `velocity` from the time `since` on; any other motion is named in `motion`. Numbers
-may be expressions in the parameters and in what a setup.py derives.
+(`origin`, `axis`, `radius`), at rest or with a steady `velocity` from the time `since` on; any other motion is named in `motion`. A free
+`box` has a `size`, and a place by the columns <name>_x to <name>_qz of time.csv; a name that ends in * stands for several. Numbers may be
+expressions in the parameters and in what a setup.py derives.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from .tables import TableReader, Types
 
 _NUMBER: Types = (int, float, str)
 _COMMON: dict[str, Types] = {"kind": str, "origin": list, "velocity": list, "since": _NUMBER, "motion": str}
-_KINDS: dict[str, dict[str, Types]] = {"plane": {**_COMMON, "normal": list}, "cylinder": {**_COMMON, "axis": list, "radius": _NUMBER}}
+_KINDS: dict[str, dict[str, Types]] = {"plane": {**_COMMON, "normal": list}, "cylinder": {**_COMMON, "axis": list, "radius": _NUMBER},
+                                     "box": {"kind": str, "size": list}}
+_NEEDED = {"plane": (), "cylinder": ("radius",), "box": ("size",)}
 
 
 def read(reader: TableReader, data: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -28,7 +31,7 @@ def read(reader: TableReader, data: Mapping[str, Any]) -> dict[str, dict[str, An
         if not isinstance(entry, dict):
             raise reader.fail(table, f"{entry!r} is not a table", 'write it as { kind = "plane", ... }')
         kind = reader.pick(str(entry.get("kind")), _KINDS, "kind of wall", table)
-        reader.table(entry, table, _KINDS[kind], ("radius",) if kind == "cylinder" else ())
+        reader.table(entry, table, _KINDS[kind], _NEEDED[kind])
         for key, value in entry.items():
             if isinstance(value, list) and (len(value) != 3 or not all(isinstance(one, int | float | str) for one in value)):
                 raise reader.fail(table, f"{key} = {value} is no vector", "give three numbers or expressions", key)

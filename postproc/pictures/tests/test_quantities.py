@@ -1,0 +1,62 @@
+"""What grains are coloured by: what the dump holds, and what their contacts give them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dembark.common.errors import DembarkError
+from dembark.postproc.fields.coarse_graining import WallContacts
+from dembark.postproc.pictures.quantities import grain_pressure, quantity, usual
+from dembark.validation.verification import scenes
+
+
+def test_pressure_in_a_grain_between_two_others():
+    """A row of three, pressed with the force F: F d over three volumes in the middle one, half of that at the ends."""
+    place = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    frame = scenes.grains(place, np.full(3, 0.5), low=-np.ones(3), high=np.full(3, 3.0))
+    pairs = np.array([[0, 1], [1, 2]])
+    links = scenes.contacts(place[pairs[:, 0]], np.tile([1.0, 0.0, 0.0], (2, 1)), np.tile([-6.0, 0.0, 0.0], (2, 1)), pairs)
+    middle = 6.0 * 1.0 / (3.0 * np.pi / 6.0)
+    np.testing.assert_allclose(grain_pressure(frame, links), [0.5 * middle, middle, 0.5 * middle])
+    wall = WallContacts(np.array([[-0.5, 0.0, 0.0]]), place[:1], np.array([[6.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(grain_pressure(frame, links, [wall]), [middle, middle, 0.5 * middle])
+
+
+@pytest.fixture
+def frame():
+    """Two grains that move, with a column of their own."""
+    grains = scenes.grains(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]]), np.array([0.5, 0.25]), low=-np.ones(3), high=np.full(3, 3.0))
+    return replace(grains, velocities=np.array([[3.0, 0.0, 4.0], [0.0, 0.0, -2.0]]), types=np.array([1, 2]),
+                   wall_forces={"side": np.array([[0.0, 0.0, 0.0], [0.0, -7.0, 0.0]])},
+                   extra={"liquid_volume": np.array([1e-9, 2e-9]), "c_wet": np.array([5.0, 6.0])})
+
+
+@pytest.mark.parametrize(("name", "values", "unit"), [
+    ("velocity", [5.0, 2.0], "m/s"), ("velocity:magnitude", [5.0, 2.0], "m/s"), ("velocity:z", [4.0, -2.0], "m/s"),
+    ("position:z", [0.0, 2.0], "m"), ("diameter", [1.0, 0.5], "m"), ("type", [1, 2], "1"), ("id", [1, 2], "1"),
+    ("force_of_side", [0.0, 7.0], "N"), ("force_of_side:y", [0.0, -7.0], "N"), ("liquid_volume", [1e-9, 2e-9], "m^3"),
+    ("c_wet", [5.0, 6.0], "")])
+def test_quantities_are_those_of_the_dump(frame, name, values, unit):
+    found = quantity(name, frame)
+    np.testing.assert_allclose(found.values, values)
+    assert found.unit == unit and found.kinds == (name == "type")
+
+
+def test_contacts_push_on_both_grains(frame):
+    links = scenes.contacts(frame.positions[:1], np.array([[1.0, 0.0, 2.0]]), np.array([[-1.0, 5.0, -2.0]]), np.array([[0, 1]]))
+    # The force (-1, 5, -2) along (1, 0, 2): 5 / sqrt 5.
+    np.testing.assert_allclose(quantity("contact_force", frame, links).values, np.full(2, 5.0 / np.sqrt(5.0)))
+    assert quantity("contact_count", frame, links).values.tolist() == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(("name", "words"), [
+    ("velocty", "unknown quantity 'velocty'.*did you mean velocity"), ("velocity:w", "unknown component 'w'"),
+    ("omega", "unknown quantity"), ("pressure", "needs the contacts")])
+def test_other_names_are_refused_with_what_is_right(frame, name, words):
+    with pytest.raises(DembarkError, match=words):
+        quantity(name, frame)
+
+
+def test_speed_is_usual_and_size_where_there_is_none(frame):
+    assert usual(frame) == "velocity" and usual(replace(frame, velocities=None)) == "diameter"
