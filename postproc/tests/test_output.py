@@ -192,7 +192,7 @@ def test_a_collection_is_complete_or_not_there(tmp_path):
         pass
     assert {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()} == before
     write_grains(path, [frame_of([[0.0, 0.0, 0.0]])])
-    assert sorted(one.name for one in tmp_path.rglob("*")) == ["000000.vtp", "f.pvd", "f_pvd"]
+    assert sorted(one.name for one in tmp_path.rglob("*")) == ["000000.vtp", "f.pvd", "f_pvd", "f_pvd.py"]
 
 
 def test_a_collection_takes_no_place_of_other_files(tmp_path):

@@ -40,7 +40,7 @@ def test_a_block_of_water_ends_where_its_cells_do(counts, shift):
 
 
 def test_particles_far_from_the_others_are_drops():
-    place = np.concatenate([block((8, 8, 8)), [[0.5, 0.0, 0.0], [0.5, 0.0, 0.3], [0.51, 0.0, 0.3]]])
+    place = np.concatenate([block((8, 8, 8)), [[0.5, 0.0, 0.0], [0.5, 0.0, 0.3], [0.52, 0.0, 0.3]]])
     triangles, drops = water.surface(frame_of(place, 0.5 * SPACING))
     assert np.flatnonzero(drops).tolist() == [512, 513, 514] and triangles[..., 0].max() < 0.2
     triangles, drops = water.surface(frame_of(place[512:], 0.5 * SPACING))
