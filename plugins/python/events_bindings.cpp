@@ -9,29 +9,21 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <initializer_list>
 #include <string>
 #include <vector>
 
+#include "arrays.hpp"
 #include "dembark/events/solver.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace dembark;
+using namespace dembark::python;
 using namespace dembark::events;
 
 namespace {
 
-using Array = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Table = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-
-nb::object numpy(const std::vector<double>& values, std::initializer_list<std::size_t> shape) {
-  double* data = new double[values.size() + 1];
-  std::copy(values.begin(), values.end(), data);
-  const nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-  return nb::cast(nb::ndarray<nb::numpy, double>(data, shape.size(), shape.begin(), owner));
-}
 
 std::vector<Vector> vectors(const Points& points) {
   std::vector<Vector> list(points.shape(0));

@@ -1,34 +1,24 @@
 // dembark._physics.ImpactScene: impact::Scene as Python sees it. Private; dembark.physics.impact adds checks, shapes, units and
 // documentation.
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <cstddef>
 #include <cstdint>
-#include <initializer_list>
 #include <string>
 #include <vector>
 
+#include "arrays.hpp"
 #include "dembark/impact/scene.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace dembark;
+using namespace dembark::python;
 using namespace dembark::impact;
 
 namespace {
-
-using Array = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Table = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-
-nb::object numpy(const std::vector<double>& values, std::initializer_list<std::size_t> shape) {
-  double* data = new double[values.size() + 1];
-  std::copy(values.begin(), values.end(), data);
-  nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-  return nb::cast(nb::ndarray<nb::numpy, double>(data, shape.size(), shape.begin(), owner));
-}
 
 void append(std::vector<double>& out, const std::vector<double>& more) { out.insert(out.end(), more.begin(), more.end()); }
 void append(std::vector<double>& out, const Vec3<double>& v) { out.insert(out.end(), {v.x, v.y, v.z}); }
@@ -44,7 +34,7 @@ std::vector<T> rows(const Table& table) {
 }
 /// The other way.
 template <class T>
-nb::object table(const std::vector<T>& list, std::size_t columns) {
+Result table(const std::vector<T>& list, std::size_t columns) {
   std::vector<double> out;
   for (const T& each : list) append(out, table_row(each));
   return numpy(out, {list.size(), columns});
