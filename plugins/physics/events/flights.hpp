@@ -135,6 +135,7 @@ class Flights {
   /// In the order of the cells.
   void sort() {
     std::vector<std::pair<int, int>> order;
+    order.reserve(states_.size());
     for (int i = 0; i < size(); ++i) order.emplace_back(cells_.number(states_[i].place), i);
     std::sort(order.begin(), order.end());
     const std::vector<Moving> moving(std::move(moving_));
