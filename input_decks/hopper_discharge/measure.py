@@ -1,5 +1,6 @@
-"""Discharge of a bin: discharged mass against time, compared with a published curve, and the law of Beverloo. Times count from 10 % of the
-mass on: published curves do not say how their gate opens. V&V 20: E = S − D is known within U_val, U_val² = U_num² + U_input² + U_D²."""
+"""Discharge of a bin: discharged mass against time, compared with a published curve, and the laws of Beverloo and of Choi. Times count from
+10 % of the mass on: published curves do not say how their gate opens. V&V 20: E = S − D is known within U_val, U_val² = U_num² + U_input² +
+U_D²."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dembark.input_decks.common.estimates import reference_rows, values_and_halves
-from dembark.input_decks.common.power_law import ordered
+from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Curve, Estimate, Measurement, Points, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.replica import Array, Replica
@@ -18,6 +19,8 @@ from dembark.postproc.studies import compared, fitted_exponent, measured, propag
 PUBLISHED = Path(__file__).with_name("reference") / "anand_2008.csv"
 # Part of all mass between which the rate is taken, and Beverloo's constant for spheres.
 LOW, HIGH, K = 0.1, 0.7, 1.4
+# Of the plug's velocity in (W/d - 1), by J. Choi, A. Kudrolli, M. Z. Bazant, J. Phys.: Condens. Matter 17 (2005) S2533.
+CHOI = 1.48
 # 95 % limits of a digitised point: the largest difference of two digitisations.
 READ = 0.0035
 TITLES = ("Discharged mass", "time since 10 % discharged (s)", "fraction of the mass of all grains")
@@ -139,8 +142,13 @@ def _with_published(runs: Sequence[Discharge], name: str) -> Curve:
 
 
 def study(name: str, points: Points, along: str) -> Measurement:
-    """The law of Beverloo in the width of the slot; or the effect of the varied parameter on the rate."""
+    """The law of Beverloo, or that of Choi, in the width of the slot; or the effect of the varied parameter on the rate."""
     points, places = ordered(points, along)
+    if name == "orifice":
+        # In one bin the velocity far above the slot is in proportion to the flow.
+        flow = PowerLawFit.of(points, "mass_rate", places / float(points[0]["parameters"]["grain_diameter"]) - 1.0)
+        return Measurement({"orifice_exponent": Value(flow.exponent, exact(CHOI))}, [
+            flow.curve("orifice", "Discharge rate", "width of the slot W / d − 1", "kg/m/s", CHOI, f"(W/d − 1)^{CHOI:g}")])
     if name != "outlet":
         one = next(point for point in points if point["variant"] == "anand")
         found = np.array([measured(point, "rate").value for point in points])

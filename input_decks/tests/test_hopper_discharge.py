@@ -73,6 +73,33 @@ def test_the_law_of_beverloo_is_found() -> None:
     assert found["beverloo_k"]["value"] == pytest.approx(1.5, abs=1e-9) and found["beverloo_c"]["value"] == pytest.approx(1.0)
 
 
+def narrow(exponent: float = 1.48) -> list[dict[str, Any]]:
+    """Rates that grow as (W/d - 1)^exponent."""
+    return [point(defaults("hopper_discharge", outlet_width=width * 0.003, grain_diameter=0.003), {"mass_rate": (width - 1.0) ** exponent},
+                  part=0.01) for width in (8.0, 3.0, 4.0, 6.0)]
+
+
+def test_the_law_of_choi_is_found() -> None:
+    study = hopper.study("orifice", narrow(), "outlet_width")
+    found = judged("hopper_discharge", study)["orifice_exponent"]
+    assert found["verdict"] == "pass" and found["value"] == pytest.approx(1.48)
+    assert 0.005 < 0.5 * np.diff(found["interval"])[0] < 0.02
+    assert study.profiles[0]["place"] == pytest.approx([2.0, 3.0, 5.0, 7.0])
+    np.testing.assert_allclose(study.profiles[0]["value"], study.profiles[0]["reference"])
+    # Beverloo's law with k = 1.4 is steeper there.
+    widths = np.array([3.0, 4.0, 6.0, 8.0])
+    steep = float(np.polyfit(np.log(widths - 1.0), 1.5 * np.log(widths - 1.4), 1)[0])
+    assert names(judged("hopper_discharge", hopper.study("orifice", narrow(steep), "outlet_width")), "fail") == {"orifice_exponent"}
+
+
+def test_narrow_slots_are_those_of_one_bin() -> None:
+    case = find("hopper_discharge")
+    values = [resolve(case, "standard", f"slot_{width}d") for width in (3, 4, 6, 8)]
+    assert [one["outlet_width"] / one["grain_diameter"] for one in values] == pytest.approx([3.0, 4.0, 6.0, 8.0])
+    assert all(one["bin_depth"] / one["grain_diameter"] == pytest.approx(8.3) and one["ends"] == "walls" for one in values)
+    assert len({(one["bin_width"], one["grain_count"], one["grain_friction"]) for one in values}) == 1
+
+
 def test_the_study_adds_what_friction_makes_of_it() -> None:
     runs = [{"parameters": defaults("hopper_discharge", grain_friction=friction), "variant": variant,
              "quantities": list(verdicts(faster=faster).values())}
@@ -142,3 +169,5 @@ def controls_hopper_discharge(_folder: Path) -> Iterator[Control]:
     for name, change in {"the discharge rate of a liquid": {"exponent": 1.0},
                          "grains as wide as a third of their diameter": {"k": 0.5}}.items():
         yield Control(name, right, judged("hopper_discharge", hopper.study("outlet", points(**change), "outlet_width")))
+    right, liquid = (judged("hopper_discharge", hopper.study("orifice", narrow(one), "outlet_width")) for one in (1.48, 1.0))
+    yield Control("the discharge rate of a liquid", right, liquid)
