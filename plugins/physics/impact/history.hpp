@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "assembly.hpp"
@@ -53,33 +53,38 @@ struct Histories {
 class Turns {
  public:
   /// rad, of body number `i` of the last call of turn().
-  double operator[](int i) const { return angles_[std::size_t(i)]; }
+  double operator[](int i) const { return angles_[place_[std::size_t(i)]]; }
 
   /// elapsed: s, in which the bodies had their spins. New ones begin at 0.
   void turn(const std::vector<Body>& bodies, double elapsed) {
     const std::size_t n = bodies.size();
-    bool same = ids_.size() == n;
-    for (std::size_t i = 0; same && i < n; ++i) same = ids_[i] == bodies[i].id;
+    bool same = ids_.size() == n && place_.size() == n;
+    for (std::size_t i = 0; same && i < n; ++i) same = ids_[place_[i]] == bodies[i].id;
     if (!same) take(bodies);
-    for (std::size_t i = 0; i < n; ++i) angles_[i] += elapsed * (bodies[i].spin.x + bodies[i].spin.y + bodies[i].spin.z);
+    for (std::size_t i = 0; i < n; ++i) angles_[place_[i]] += elapsed * (bodies[i].spin.x + bodies[i].spin.y + bodies[i].spin.z);
   }
 
   auto fields() { return std::tie(ids_, angles_); }
 
  private:
   void take(const std::vector<Body>& bodies) {
-    std::map<std::int64_t, double> known;
-    for (std::size_t i = 0; i < ids_.size(); ++i) known[ids_[i]] = angles_[i];
+    const Turns before(std::move(*this));
     ids_.clear();
-    angles_.clear();
-    for (const Body& body : bodies) {
-      ids_.push_back(body.id);
-      angles_.push_back(known[body.id]);
+    for (const Body& body : bodies) ids_.push_back(body.id);
+    std::sort(ids_.begin(), ids_.end());
+    angles_.assign(ids_.size(), 0.0);
+    for (std::size_t k = 0; k < ids_.size(); ++k) {
+      const std::size_t known = before.find(ids_[k]);
+      if (known < before.ids_.size() && before.ids_[known] == ids_[k]) angles_[k] = before.angles_[known];
     }
+    place_.clear();
+    for (const Body& body : bodies) place_.push_back(find(body.id));
   }
+  std::size_t find(std::int64_t id) const { return std::size_t(std::lower_bound(ids_.begin(), ids_.end(), id) - ids_.begin()); }
 
-  std::vector<std::int64_t> ids_;
+  std::vector<std::int64_t> ids_;  // in their order, so that a state does not depend on that of the bodies
   std::vector<double> angles_;
+  std::vector<std::size_t> place_;  // of each body in these
 };
 
 class HistoryKeeper {
