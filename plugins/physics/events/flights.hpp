@@ -220,7 +220,7 @@ class Flights {
         velocity -= t * gravity_;
       }
       const double found = pair_contact(place, velocity, m.radius + o.radius, best);
-      // Of equal times the lower number, in whatever order the cells hold them.
+      // Of equal times the first in memory, in whatever order the cells hold them.
       if (!(found < best || (found == best && j < partner))) return;
       best = found;
       partner = j;

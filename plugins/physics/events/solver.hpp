@@ -93,6 +93,8 @@ class Solver : public Flights {
 
   /// New velocities and spins of all grains, now.
   void set_velocities(const std::vector<Vector>& velocities, const std::vector<Vector>& spins) {
+    if (velocities.size() != states_.size() || spins.size() != states_.size())
+      throw std::invalid_argument("there must be one velocity and one spin a grain");
     now_ = std::max(now_, time_ - base_);
     for (int i = 0; i < size(); ++i) {
       advance(i);

@@ -1,5 +1,5 @@
 // The next event of all: a tournament of the grains' next events, one a grain (B. D. Lubachevsky, J. Comput. Phys. 94 (1991) 255). Of equal
-// times the grain with the lower number wins, so that runs are the same whatever went before.
+// times the one that lies first in memory wins, so that runs are the same bits.
 #pragma once
 
 #include <cstddef>

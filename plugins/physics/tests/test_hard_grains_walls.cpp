@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
+#include <fstream>
 #include <random>
 #include <string>
 #include <vector>
@@ -166,10 +168,12 @@ TEST_CASE("A plate that passes a ball by less than rounding from a tangent is hi
 
 TEST_CASE("Bounds of a motion hold, and its jumps are found", "[events]") {
   const Vector along{0.0, 0.6, 0.8};
+  const std::string name = "test_hard_grains_table.csv";
+  std::ofstream(name) << "0 0 0 0\n0.4 0 1 2\n0.9 0 -1 1\n1.2 0 0.5 0\n2 0 0 0.3\n";
   for (const std::string words :
        {"harmonic amplitude 1 2 -1 frequency 3 phase 0.7 ramp 0", "harmonic amplitude 1 2 -1 frequency 3 ramp 1 until 2",
         "circular first 0 1 0 second 0 0 2 frequency 2 ramp 2", "uniform velocity 0 1 1 acceleration 0 0 3 start 0.5 until 1.5",
-        "jolts shape half_sine acceleration 0 0 5 duration 0.2 interval 0.3 count 3"}) {
+        "jolts shape half_sine acceleration 0 0 5 duration 0.2 interval 0.3 count 3", "table file test_hard_grains_table.csv"}) {
     const PrescribedMotion motion(words);
     const motion::Bounds bounds = motion.bounds(along);
     double far = 0.0, strong = 0.0;
@@ -183,6 +187,7 @@ TEST_CASE("Bounds of a motion hold, and its jumps are found", "[events]") {
     CHECK(strong <= bounds.acceleration * (1.0 + 1e-12));
     CHECK(bounds.acceleration < 2.0 * strong);
   }
+  std::remove(name.c_str());
   const PrescribedMotion late("uniform velocity 0 1 1 start 0.5 until 1.5 harmonic amplitude 0 0 1 frequency 1 ramp 0 until 1");
   CHECK(late.next_jump(0.0) == 0.5);
   CHECK(late.next_jump(0.5) == 1.0);

@@ -218,7 +218,7 @@ class HardGrains:
 
     def set_velocities(self, velocity: ArrayLike, spin: ArrayLike | None = None) -> None:
         """Velocities (m/s, (g, d)) and spins of all grains now, as from a thermostat; no spins: they stay. The accounts do not see it."""
-        grains = self._solver.grains()
+        grains = np.asarray(self._solver.grains())
         n = len(grains)
         spins = grains[:, 8:] if spin is None else self._spins(spin, n)
         self._solver.set_velocities(_vectors("velocity", velocity, "m/s", n, self._dimension), np.ascontiguousarray(spins))
