@@ -162,7 +162,7 @@ class Colours:
 @dataclass(frozen=True, eq=False)
 class Sheet:
     """A picture of `size` (width, height) pixels in a `view` of everything in `extent`, see View.extent, with the scale of `colours` on its
-    right (None: none). Without a size it has the shape of the extent. `letters` are so high, over the height of the picture."""
+    right (None: none). Without a size it has the shape of the extent. `letters` are so high, over the height of a picture of 4 by 3."""
 
     view: View
     extent: Array
@@ -178,7 +178,7 @@ class Sheet:
             object.__setattr__(self, "size", (round(fitting[0]), round(fitting[1])))
         assert self.size
         width, height = self.size
-        bar = round(min(max(8.0 * self.letters * height, 90.0), 0.3 * width)) if self.colours else 0
+        bar = round(min(max(8.0 * self.letters * max(0.75 * width, height), 90.0), 0.3 * width)) if self.colours else 0
         object.__setattr__(self, "camera", Camera.around(self.view, self.extent, (width - bar, height)))
 
     def compose(self, image: Bytes, time: float) -> Bytes:
@@ -189,7 +189,7 @@ class Sheet:
         assert self.size
         width, height = self.size
         dots, shown = 100.0, self.camera.size[0]
-        letters = max(7.0, self.letters * min(width, 1.2 * height) * 72.0 / dots)  # points
+        letters = max(7.0, self.letters * max(0.75 * width, height) * 72.0 / dots)  # points
         with mpl.rc_context({**STYLE, "font.size": letters}):
             figure = Figure(figsize=(width / dots, height / dots), dpi=dots, facecolor="white")
             figure.figimage(image, 0, 0, origin="upper")
@@ -308,9 +308,9 @@ def _image(scene: Scene, camera: Camera) -> Bytes:
     if any(one.opacity < 1.0 for one in scene.surfaces):
         plotter.enable_depth_peeling(8)
     if len(scene.radii):
-        # Grains cast shade on those next to them.
+        # Grains cast shade on those that they touch; from farther away, VTK counts the empty background, too.
         size = float(np.median(scene.radii))
-        plotter.enable_ssao(radius=6.0 * size, bias=0.1 * size, kernel_size=64)
+        plotter.enable_ssao(radius=2.0 * size, bias=0.1 * size, kernel_size=64)
     plotter.enable_anti_aliasing("ssaa")
     plotter.camera.clipping_range = (0.9 * span, 2.1 * span)
     image = np.asarray(plotter.screenshot(return_img=True))

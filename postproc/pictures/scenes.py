@@ -38,7 +38,7 @@ _NEIGHBOURS = 8  # particles whose mean colours a point of the surface
 _MOST_KINDS = 12
 _STRAY = 0.001  # part of the grains, at each end of each axis, that may be out of the picture
 _SPACE = View(np.eye(3))
-_PRINTED = 0.032  # height of letters in the report, whose pictures are small
+_PRINTED = 0.028  # height of letters in the report, whose pictures are small
 _PREFIXES = ((1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"))
 
 
@@ -47,7 +47,7 @@ class Look:
     """How a run is drawn: `colour_by` a quantity ("": the usual one), in `unit` or over `scale` (SI), from one end of `span` (in that unit)
     to the other, on the map `colours` of matplotlib; in a `view` of render.VIEWS or "x,y,z" ("": one that suits the run); `cut`: without
     the half that is nearer to the eye; `surface`: particles of a fluid are drawn by its surface; `size` in pixels; height of `letters` over
-    that of the picture."""
+    that of a picture of 4 by 3."""
 
     colour_by: str = ""
     unit: str = ""
