@@ -104,7 +104,8 @@ def test_values_are_in_the_unit_and_range_of_the_user(run):
 
 def test_types_are_kinds_and_glued_grains_grey(run):
     found = album(run, [0], colour_by="type")
-    assert found.sheet.colours.kinds == (1, 2)
+    # The glued one is too far away to be shown.
+    assert found.sheet.colours.kinds == (1,)
     near = album(run, [0], colour_by="id")
     assert near.sheet.colours.kinds == ()
     glued = frame_of(PLACE[:2], 0.02)
