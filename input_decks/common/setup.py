@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from types import SimpleNamespace as Parameters
 
 import numpy as np
@@ -26,6 +27,13 @@ class Setup:
     numbers: Mapping[str, Number] = field(default_factory=dict)
     meshes: Mapping[str, Array] = field(default_factory=dict)
     tables: Mapping[str, tuple[Number, ...]] = field(default_factory=dict)
+
+
+def of_sort(p: Parameters, sort: str) -> Parameters:
+    """One of several sorts of grains, under the names that the numbers of equal grains have: what begins with the name of the `sort`."""
+    own = {f"grain_{name}": getattr(p, f"{sort}_{name}") for name in ("count", "diameter", "density")}
+    elastic = {name: getattr(p, f"{sort}_{name}") for name in ("youngs_modulus", "poisson_ratio")}
+    return Parameters(**{**vars(p), **own, **elastic, "grain_diameter_spread": 0.0})
 
 
 def rayleigh_time(p: Parameters) -> float:
@@ -103,3 +111,18 @@ def strip(corner: Sequence[float], along: Sequence[float], depth: float) -> Arra
     side = [length / panels for length in along]
     corners = ([x + length * k for x, length in zip(corner, side, strict=True)] for k in range(panels))
     return np.vstack([rectangle(start, (0.0, depth, 0.0), side) for start in corners])
+
+
+def revolved(line: list[tuple[float, float]], sides: int, height: float) -> Array:
+    """Triangles (n, 3, 3) in m of a polygon of `sides`, one corner at y = 0, along a `line` of radii and heights (m), which is cut into
+    rings no higher than `height` (m): large triangles are near many grains."""
+    rings = []
+    for (r, z), (r2, z2) in pairwise(line):
+        parts = math.ceil((z2 - z) / height)
+        rings += [(r + (r2 - r) * k / parts, z + (z2 - z) * k / parts) for k in range(parts)]
+    angle = 2.0 * math.pi * np.arange(sides + 1) / sides
+    circle = np.column_stack((np.cos(angle), np.sin(angle)))
+    circle[-1] = circle[0]
+    points = np.array([np.column_stack((r * circle, np.full(len(circle), z))) for r, z in [*rings, line[-1]]])
+    a, b, c, d = points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]
+    return np.concatenate([np.stack(corners, axis=2).reshape(-1, 3, 3) for corners in ((a, b, c), (a, c, d))])

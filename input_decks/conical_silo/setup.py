@@ -1,13 +1,12 @@
 """Conical silo: a dilute column of grains in a closed silo, its walls as triangles, and the steps of the filling and of the output."""
 
 import math
-from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Array, Parameters, Setup, rectangle, time_step
+from dembark.input_decks.common.setup import Array, Parameters, Setup, rectangle, revolved, time_step
 
 # The grains fall with this modulus (Pa) and fraction of the Rayleigh time.
 FILLING = {"youngs_modulus": 5e6, "time_step_fraction": 0.2}
@@ -50,18 +49,3 @@ def sites(p: Parameters) -> tuple[Array, float]:
     places = packing.cylinder(inside, spacing, low, layers)
     places = places[np.hypot(places[:, 0], places[:, 1]) <= p.lip_radius + places[:, 2] - math.sqrt(2.0) * low][:count]
     return places, float(places[-1, 2] + spacing)
-
-
-def revolved(line: list[tuple[float, float]], sides: int, height: float) -> Array:
-    """Triangles (n, 3, 3) in m of a polygon of `sides`, one corner at y = 0, along a `line` of radii and heights (m), which is cut into
-    rings no higher than `height` (m): large triangles are near many grains."""
-    rings = []
-    for (r, z), (r2, z2) in pairwise(line):
-        parts = math.ceil((z2 - z) / height)
-        rings += [(r + (r2 - r) * k / parts, z + (z2 - z) * k / parts) for k in range(parts)]
-    angle = 2.0 * math.pi * np.arange(sides + 1) / sides
-    circle = np.column_stack((np.cos(angle), np.sin(angle)))
-    circle[-1] = circle[0]
-    points = np.array([np.column_stack((r * circle, np.full(len(circle), z))) for r, z in [*rings, line[-1]]])
-    a, b, c, d = points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]
-    return np.concatenate([np.stack(corners, axis=2).reshape(-1, 3, 3) for corners in ((a, b, c), (a, c, d))])
