@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -123,6 +124,39 @@ def test_small_grains_begin_above_large_ones_without_contacts() -> None:
     assert len(mixing.overlaps(frame)) == 0
     assert (np.hypot(places[:, 0], places[:, 2]) + 0.5 * sizes).max() < 0.1 * math.cos(math.pi / 100)
     assert (np.abs(places[:, 1]) + 0.5 * sizes).max() < 0.03
+
+
+SMALL = {"small_count": 400, "large_count": 100, "drum_radius": 0.03, "drum_width": 0.016, "sides": 40, "drum_speed": 6.0, "softening": 100,
+         "time_step_fraction": 0.2, "settle_time": 0.02, "relax_time": 0.01, "duration": 0.3, "frames": 5}
+
+
+@pytest.mark.parametrize("engine", CASE.engines)
+def test_a_small_drum_is_filled_in_layers_and_carries_them_up(engine: str, simulate: Any) -> None:
+    one = simulate("mixing_drum", engine, SMALL)
+    rows, frames = one.times(), list(one.grains())
+    assert rows["time"] == pytest.approx(0.01 * np.arange(1, 31)) and [frame.step for frame in frames[:2]] == [
+        one.derived["first"], one.derived["first"] + one.derived["stride"]]
+    assert mixing.leaked(one) == 0 and np.concatenate([mixing.overlaps(frame) for frame in frames]).max() < 0.1
+    small, large = (frames[0].types == kind for kind in (1, 3))
+    assert small.sum() == 400 and large.sum() == 100 and set(frames[0].radii[small]) == {0.001} and set(frames[0].radii[large]) == {0.002}
+    # At rest, but for the first hundredth of a second, and in layers.
+    height = frames[0].positions[:, 2]
+    assert np.median(np.abs(frames[0].velocities)) < 0.1 and height[small].mean() - height[large].mean() > 0.006
+    # What the history has is what the frames have.
+    places = frames[0].positions[large]
+    assert rows["large_zone2"][0] == ((places[:, 0] < 0.0) & (places[:, 2] < 0.0)).sum()
+    assert [rows[f"large_{axis}"][0] for axis in "xyz"] == pytest.approx(places.mean(axis=0), abs=1e-8)
+    # The wall at positive x moves up, and takes the grains there; then they slide back.
+    assert abs(rows["large_x"][0]) < 0.002 and rows["large_x"].max() > 0.005 and rows["small_zone1"].max() > 20
+
+
+@pytest.mark.parametrize("engine", CASE.engines)
+def test_a_drum_that_was_stopped_resumes_exactly(engine: str, decks: Any, tmp_path: Path) -> None:
+    one = decks("mixing_drum", engine, tmp_path / engine, SMALL | {"duration": 0.05})
+    one.run(restart_every=1000)
+    before = {name: (one.folder / name).read_bytes() for name in ("time.csv", "grains.dump")}
+    assert re.search(r"dembark: resumed at step \d+ exactly", one.run(restart_every=1000, resume="yes"))
+    assert {name: (one.folder / name).read_bytes() for name in before} == before
 
 
 def controls_mixing_drum(_folder: Path) -> Iterator[Control]:

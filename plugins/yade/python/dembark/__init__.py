@@ -29,6 +29,7 @@ from yade.dembark.scene import (
     planes,
     slab_loop,
 )
+from yade.dembark.sorts import of_sorts, sort_materials
 from yade.dembark.states import options, run, table
 from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energies
 
@@ -36,6 +37,6 @@ __all__ = [
     "Balance", "CubesRecorder", "DumpWriter", "EnergyWriter", "FluidRecorder", "FluidWriter", "FrameWriter", "HistoryWriter", "LogWriter",
     "Recorder", "StepMeans", "TouchWriter", "begin", "block", "box", "contact_loop", "drum", "energies", "engine_loop", "fail", "finish",
     "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs", "machine_history", "materials",
-    "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "options", "packing", "pairs", "parameters", "periodic", "plane",
-    "planes", "run", "set_friction", "slab_loop", "table", "tank_walls",
+    "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "of_sorts", "options", "packing", "pairs", "parameters", "periodic",
+    "plane", "planes", "run", "set_friction", "slab_loop", "sort_materials", "table", "tank_walls",
 ]

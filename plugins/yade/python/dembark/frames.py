@@ -68,10 +68,11 @@ class FrameWriter:
     columns : names of the columns of time.csv after step, time and kinetic_energy
     bounds : ((xlo, xhi), (ylo, yhi), (zlo, zhi)), m; by default those of packing.data
     gravity : m/s^2
+    types : id -> type of a row of grains.dump; 1 for others
     """
 
-    def __init__(self, columns=(), bounds=None, gravity=(0.0, 0.0, 0.0)):
-        self.gravity = gravity
+    def __init__(self, columns=(), bounds=None, gravity=(0.0, 0.0, 0.0), types=None):
+        self.gravity, self.types = gravity, types or {}
         self._box = "".join(f"{low:.17g} {high:.17g}\n" for low, high in bounds or box())
         self._history = table("time.csv", ",".join(["step", "time", "kinetic_energy", *columns]))
         self._begin("grains.dump")
@@ -91,7 +92,8 @@ class FrameWriter:
         rows = []
         for body in spheres():
             force, velocity, spin = motion(body, self.gravity)
-            rows.append((body.id + 1, 1, *body.state.pos, 0, 0, 0, *velocity, *spin, *force, body.shape.radius, body.state.mass))
+            kind = self.types.get(body.id, 1)
+            rows.append((body.id + 1, kind, *body.state.pos, 0, 0, 0, *velocity, *spin, *force, body.shape.radius, body.state.mass))
         self._frame("grains.dump", "ATOMS", rows, "id type x y z ix iy iz vx vy vz omegax omegay omegaz fx fy fz radius mass")
 
     def row(self, *values):

@@ -67,15 +67,18 @@ def materials(p):
 def grains(material, gravity=(0, 0, 0), mask=1, held=None, path="packing.data"):
     """Add the spheres of the packing: those of type 1 with `material` and `mask`, the others held with the (material, mask) `held`.
 
-    YADE's velocities are half a step behind positions: with `gravity` (m/s^2), and O.dt set, those of the file are met at the time zero.
-    Returns the ids of all by type.
+    `material` may be a dictionary, by type. Masses are those of the densities in the packing. YADE's velocities are half a step behind
+    positions: with `gravity` (m/s^2), and O.dt set, those of the file are met at the time zero. Returns the ids of all by type.
     """
     ids = {}
-    for kind, diameter, _, place, velocity, spin in packing(path):
+    for kind, diameter, density, place, velocity, spin in packing(path):
         moves = kind == 1 or held is None
-        own, bits = (material, mask) if moves else held
+        own, bits = (material[kind] if isinstance(material, dict) else material, mask) if moves else held
         body = utils.sphere(place, 0.5 * diameter, material=own, mask=bits, fixed=not moves)
         if moves:
+            # 1 but where sorts of grains share a material.
+            heavier = density / O.materials[own].density
+            body.state.mass, body.state.inertia = heavier * body.state.mass, heavier * body.state.inertia
             body.state.vel = Vector3(*velocity) - 0.5 * O.dt * Vector3(*gravity)
             body.state.angVel = Vector3(*spin)
         ids.setdefault(kind, []).append(O.bodies.append(body))
