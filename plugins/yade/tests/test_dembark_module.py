@@ -103,7 +103,7 @@ PACKING = """dembark packing
 
 Atoms
 
-2 1 0.006 2500 0.1 0 0
+2 1 0.006 2000 0.1 0 0
 1 1 0.005 2500 0 0 0.5
 3 2 0.004 2500 0.2 0 0
 
@@ -120,7 +120,8 @@ def test_a_packing_becomes_spheres_in_its_order(yade):
         O.dt = 1e-3
         one, other = (O.materials.append(FrictMat(density=2500)) for _ in range(2))
         ids = dembark.grains(one, gravity=(0, 0, -10), held=(other, 2))
-        bodies = [(list(b.state.pos), b.shape.radius, list(b.state.vel), list(b.state.angVel), b.dynamic, b.mask) for b in O.bodies]
+        bodies = [(list(b.state.pos), b.shape.radius, list(b.state.vel), list(b.state.angVel), b.dynamic, b.mask, b.state.mass)
+                  for b in O.bodies]
         json.dump([ids, bodies], open("packed.json", "w"))
         print("done")
         """)
@@ -129,8 +130,10 @@ def test_a_packing_becomes_spheres_in_its_order(yade):
     ids, bodies = json.loads((yade.folder / "packed.json").read_text())
     assert ids == {"1": [0, 1], "2": [2]}
     # Velocities are half a step behind positions.
-    assert bodies[0] == [[0, 0, 0.5], 0.0025, [0, 0, -0.245], [0, 3, 0], True, 1]
-    assert bodies[1][1] == 0.003 and bodies[1][2] == [0, 0, 0.005] and bodies[2][4:] == [False, 2]
+    assert bodies[0][:6] == [[0, 0, 0.5], 0.0025, [0, 0, -0.245], [0, 3, 0], True, 1]
+    assert bodies[1][1] == 0.003 and bodies[1][2] == [0, 0, 0.005] and bodies[2][4:6] == [False, 2]
+    # Densities are those of the packing, not of the material.
+    assert bodies[0][6] / bodies[1][6] == pytest.approx(2500 / 2000 * (5 / 6) ** 3)
 
 
 @pytest.mark.parametrize(("word", "parts"), [("restart_every=often", ("restart_every=often", "number of steps")),
