@@ -15,7 +15,8 @@ from scipy.integrate import solve_ivp
 from dembark.input_decks.common.setup import of_sort
 from dembark.input_decks.tests.conftest import Deck
 from dembark.postproc.history import reached
-from dembark.validation.case.folders import find
+from dembark.validation import engines
+from dembark.validation.case.folders import find, package_root
 from dembark.validation.case.resolve import resolve
 
 # The materials are those of the mixing drum; two grains meet head on, or graze each other.
@@ -159,3 +160,36 @@ def test_one_of_several_sorts_has_the_names_of_equal_grains() -> None:
     large = of_sort(SimpleNamespace(**resolve(find("mixing_drum"))), "large")
     assert (large.grain_count, large.grain_diameter, large.grain_density, large.youngs_modulus) == (8000, 0.004, 2000.0, 5e8)
     assert large.grain_diameter_spread == 0.0 and large.gravity == 9.81
+
+
+SORTED = """{% from "grains_and_steel.in" import materials, contacts with context %}
+<< materials(["a", "b", "c"]) >>
+<< contacts({"a": "1", "b": "2", "c": "3"}, {}) >>
+"""
+
+
+def written(engine: str) -> list[list[str]]:
+    """Words of the lines of a deck of three sorts."""
+    shared = package_root() / "common"
+    text = engines.engine_class(engine).deck_text(SORTED, {"presliding": engines.DeckNumber("linear")}, [shared / engine, shared])
+    return [line.split() for line in text.replace("&\n", "").splitlines()]
+
+
+def test_each_pair_of_three_sorts_has_numbers_of_its_own() -> None:
+    """Types are a, steel, b, c."""
+    expected = [["a", "a_steel", "a_b", "a_c"], ["a_steel", "steel", "b_steel", "c_steel"], ["a_b", "b_steel", "b", "b_c"],
+                ["a_c", "c_steel", "b_c", "c"]]
+    lines = {words[1]: words for words in written("liggghts") if words[:1] == ["fix"]}
+    assert lines["youngsModulus"][5:] == ["peratomtype", "1", "${steel_youngs_modulus}", "2", "3"]
+    assert lines["poissonsRatio"][6:] == [f"${{{name}_poisson_ratio}}" for name in ("a", "steel", "b", "c")]
+    for name, number in (("coefficientRestitution", "restitution"), ("staticFriction", "friction"), ("kineticFriction", "friction")):
+        assert lines[name][5:7] == ["peratomtypepair", "4"]
+        assert lines[name][7:] == [f"${{{owner}_{number}}}" for row in expected for owner in row]
+    assert lines["criticalSlipDistance"][6:] == ["4", *["0"] * 16]
+    pairs = {(words[1], words[2]): words[3:] for words in written("lammps") if words[:1] == ["pair_coeff"] and "restitution" in words}
+    assert pairs == {(str(i + 1), str(j + 1)): ["restitution", f"${{{expected[i][j]}_restitution}}", "static_friction",
+                                                f"${{{expected[i][j]}_friction}}", "kinetic_friction", f"${{{expected[i][j]}_friction}}"]
+                     for i in range(4) for j in range(i, 4)}
+    moduli = [words for words in written("lammps") if "youngs_modulus" in words]
+    assert [words[1:5] for words in moduli] == [["1", "1", "youngs_modulus", "1"], ["2", "2", "youngs_modulus", "${steel_youngs_modulus}"],
+                                                ["3", "3", "youngs_modulus", "2"], ["4", "4", "youngs_modulus", "3"]]
