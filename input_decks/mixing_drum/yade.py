@@ -10,9 +10,9 @@ ids = dembark.grains({1: materials["small"], 3: materials["large"]})
 walls = {"drum": dembark.mesh("drum.stl", materials["steel"])}
 
 
-def engines(record="pass", **more):
-    """All engines, with a surface of their own."""
-    surface, friction = FacetSurface(), dembark.of_sorts(p, materials, "friction")
+def engines(record="pass", friction=None, **more):
+    """All engines, with a surface of their own; `friction` of all pairs other than that of the sorts."""
+    surface, friction = FacetSurface(), dembark.of_sorts(p, materials, "friction") if friction is None else friction
     loop = SphereContactLoop(
         [Ig2_Sphere_Sphere_ScGeom(), Ig2_FacetSurface_Sphere_ScGeom(surface=surface)],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=dembark.of_sorts(p, materials, "restitution"), staticFriction=friction,
@@ -27,7 +27,7 @@ def settle(moduli, time_step, steps, damping=0):
     """Let the grains fall or relax with these moduli, by sort; with the contacts go their springs."""
     for sort, modulus in zip(SORTS, moduli, strict=True):
         O.materials[materials[sort]].young = modulus
-    O.dt, O.engines = time_step, engines()
+    O.dt, O.engines = time_step, engines(friction=p.filling_friction)
     O.engines[-1].damping = damping
     O.run(steps, True)
     O.interactions.clear()
