@@ -1,6 +1,7 @@
 """A flow in a channel between two walls: velocities and stresses over cells across it and bands of height, steady part. x runs from wall to
-wall, 0 to W; y is periodic, gravity points along -z, velocities are counted downward. Grains glued to a rough wall stand on its plane.
-Eulerian means weigh each grain by its exact volume in the cell, Lagrangian ones are displacements of single grains."""
+wall, 0 to W; y is periodic or ends at two more walls, gravity points along -z, velocities are counted downward. Grains glued to a rough
+wall stand on its plane. Eulerian means weigh each grain by its exact volume in the cell, Lagrangian ones are displacements of single
+grains."""
 
 from __future__ import annotations
 
@@ -39,8 +40,9 @@ def _ratio(above: Array, below: Array) -> Array:
 class Channel:
     """One replica, steady part: arrays over frames, cells across (x) and bands of height (z), in SI units. `speed` (m/s): the scale of
     velocities. `solid` (m3), `flow` = sum V v (m4/s), `flow2` = sum V v^2 are (frames, cells, bands); `pressure` (frames, cells);
-    `grain_place`, `grain_speed` (grains,): mean x (m) and Lagrangian velocity (m/s); `core_motion`: that of the core from frame to frame;
-    `normal`, `shear` (frames, bands, 2): stresses (Pa) of the left and right wall. `remark`: why it is not steady, or ''."""
+    `track` (frames, grains, 3): places (m) of all moving grains at the times `clock` (s); `grain_place`, `grain_speed`: mean x (m) and
+    Lagrangian velocity (m/s) of those that stay; `core_motion`: that of the core from frame to frame; `normal`, `shear` (frames, bands, 2):
+    stresses (Pa) of the left and right wall. `remark`: why it is not steady, or ''."""
 
     edges: Array
     levels: Array
@@ -55,6 +57,8 @@ class Channel:
     pressure: Array
     normal: Array
     shear: Array
+    track: Array
+    clock: Array
     grain_place: Array
     grain_speed: Array
     core_motion: Array
@@ -200,7 +204,8 @@ def joined(given: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], track: A
     over_frames: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     return Channel(
         edges=cells_across(width, diameter), width=width, depth=float(given["channel_depth"]), diameter=diameter,
-        density=float(given["grain_density"]), core_motion=-np.diff(track[:, inner, 2].mean(axis=1)) / np.diff(clock),
+        density=float(given["grain_density"]), track=track, clock=clock,
+        core_motion=-np.diff(track[:, inner, 2].mean(axis=1)) / np.diff(clock),
         grain_place=track[:, stays, 0].mean(axis=0), grain_speed=-profiles.lagrangian_velocities(track[:, stays], clock)[:, 2],
         **over_frames, **more)
 
@@ -228,7 +233,7 @@ def read(replica: Replica) -> Channel:
         rows.append(frame_rows(grains, contacts, edges, levels, depth))
     track = np.array(paths)
     stays = (track[0, :, 2] > bottom[0] + 2.0 * diameter) & (track[-1, :, 2] < top[-1] - 2.0 * diameter)
-    walls = sum(times[f"{wall}_fz"] for wall in ("left", "right", "base"))
+    walls = sum(times[f"{wall}_fz"] for wall in ("left", "right", "front", "rear", "base") if f"{wall}_fz" in times)
     return joined(given, rows, track, stays, steps[used].astype(float) * replica.time_step, levels=levels, speed=float(given["base_speed"]),
                   force_error=block_mean((walls / weight - 1.0)[times["step"] >= start]), height=float(np.mean(top - bottom)),
                   steady_share=float(used.mean()), remark=remark)

@@ -71,8 +71,9 @@ class Flow:
         """`fields` (cells between the walls, cells up) in units of d, v0 and Pa."""
         one, place, width = self.channel, fields.grid.centres(0), WIDTH * self.channel.diameter
         assert fields.stress is not None
-        # The kernel reaches through the walls, where nothing is.
-        cover = (ndtr(place / width) - ndtr((place - one.width) / width))[:, None, None]
+        # The kernel reaches through the walls, where nothing is; so does the grid along y, unless that is periodic.
+        within = one.depth / (fields.grid.high[1] - fields.grid.low[1])
+        cover = within * (ndtr(place / width) - ndtr((place - one.width) / width))[:, None, None]
         found = {
             "velocity": -fields.velocity[..., 2] / one.speed,
             "shear_rate": -fields.velocity_gradient[..., 2, 0] * one.diameter / one.speed,
@@ -123,8 +124,10 @@ def read(replica: Replica) -> Flow:
     d, depth, width = channel.diameter, channel.depth, channel.width
     margin = CUTOFF * WIDTH * d
     across = round((width + 2.0 * margin) / (0.25 * d))
-    low, high = np.array([-margin, 0.0, channel.levels[0]]), np.array([width + margin, depth, channel.levels[-1]])
-    grid = Grid(low, high, (across, 1, 2 * (len(channel.levels) - 1)), (False, True, False))
+    periodic = bool(replica.grains()[0].periodic[1])
+    ends = 0.0 if periodic else margin
+    low, high = np.array([-margin, -ends, channel.levels[0]]), np.array([width + margin, depth + ends, channel.levels[-1]])
+    grid = Grid(low, high, (across, 1, 2 * (len(channel.levels) - 1)), (False, periodic, False))
     planes = (PlaneWall("left", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), PlaneWall("right", (width, 0.0, 0.0), (-1.0, 0.0, 0.0)))
     blocks = time_blocks(channel.shear.sum(axis=(1, 2)))
     sums: dict[int, FieldSums] = {}

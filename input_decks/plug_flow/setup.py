@@ -17,9 +17,12 @@ def setup(p: Parameters) -> Setup:
     d_max, rough = packing.largest(p), p.wall_roughness == "rough"
     # Glued grains are as wide as the mean grain and centred up to 0.1 of that off the wall.
     margin = 0.15 * d_max + (0.6 * p.grain_diameter if rough else 0.0)
-    sites, height = packing.slab(p, p.channel_width, p.channel_depth, margin, foot=0.15 * d_max)
+    # Room for a front and a rear wall, within the cells of the column and outside of the channel.
+    inset, outside = (0.15 * d_max, d_max) if p.ends == "walls" else (0.0, 0.0)
+    sites, height = packing.slab(p, p.channel_width, p.channel_depth - 2.0 * inset, margin, foot=0.15 * d_max)
+    sites[:, 1] += inset
     low = -p.base_speed * step * (steps["steps"] - settle_steps) - 2.0 * d_max
-    box = [(-d_max, p.channel_width + d_max), (0.0, p.channel_depth), (low, height + 2.0 * d_max)]
+    box = [(-d_max, p.channel_width + d_max), (-outside, p.channel_depth + outside), (low, height + 2.0 * d_max)]
     bodies = packing.grains(p, sites, box)
     if rough:
         bodies = bodies.joined(glued_places(p, low, height), p.grain_diameter, p.grain_density, 2)

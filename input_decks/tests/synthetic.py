@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 from dembark.input_decks.common.momentum import PARTS
 from dembark.physics import capillary_force
@@ -123,27 +124,43 @@ def silo(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: 
 
 
 def plug_flow(results: Path, *, engine: str = "liggghts", replica: int = 1, variant: str = "smooth", slip: float = 0.4,
-              decay: float = 2.0, noise: float = 0.02, seed: int = 0, tilt: float = 0.0, lift: float = 1.0, faster: float = 1.0) -> Path:
+              decay: float = 2.0, noise: float = 0.02, seed: int = 0, tilt: float = 0.0, lift: float = 1.0, faster: float = 1.0,
+              walk: tuple[float, float] | None = None, gaussian: float = 0.0) -> Path:
     """Write a replica with v / v_core = 1 - slip exp(-distance / (decay d)) and flux v0 rho_b; returns the engine's folder. `tilt`: a
     linear variation of the core's velocity from wall to wall, which a flat core must not have; `lift`: what walls and base carry over the
-    weight; `faster`: velocities over those of the displacements."""
+    weight; `faster`: velocities over those of the displacements. `walk`: streamwise and transverse standard deviation, in d, of the random
+    steps from frame to frame in two layers, at a front and a rear wall. They have Student's distribution with 2.5 degrees of freedom, and a
+    Gaussian one nearer than `gaussian` d to a side wall."""
     random = np.random.default_rng(seed)
-    width, depth, speed, step_length = 20 * DIAMETER, 5 * DIAMETER, 0.02, 1e-5
-    across, along, up = (np.arange(count) + 0.5 for count in (20, 5, 30))
+    counts = (20, 5, 30) if walk is None else (20, 2, 40)
+    width, depth, speed, step_length = 20 * DIAMETER, counts[1] * DIAMETER, 0.02, 1e-5
+    across, along, up = (np.arange(count) + 0.5 for count in counts)
     place = DIAMETER * np.stack(np.meshgrid(across, along, up, indexing="ij"), axis=-1).reshape(-1, 3)
+    if walk is not None and any(walk):
+        # Evenly spread: grains that leave the columns of a lattice have a mean velocity.
+        place[:, 0] = DIAMETER * (0.5 + 19.0 * random.random(len(place)))
     from_wall = np.minimum(place[:, 0], width - place[:, 0]) / DIAMETER
     profile = (1.0 - slip * np.exp(-from_wall / decay)) * (1.0 + tilt * (place[:, 0] / width - 0.5))
     profile *= len(profile) / profile.sum()
     radii = np.full(len(place), 0.5 * DIAMETER)
     mass = DENSITY * 4.0 / 3.0 * np.pi * radii**3
-    run = Written(results, "plug_flow", variant, engine, replica, ((-1.0, 1.0), (0.0, depth), (-1.0, 1.0)), "ff pp ff")
+    run = Written(results, "plug_flow", variant, engine, replica, ((-1.0, 1.0), (0.0, depth), (-1.0, 1.0)),
+                  "ff pp ff" if walk is None else "ff ff ff")
     steps = 100000 + 2000 * np.arange(FLOW_FRAMES)
     left, right = ((from_wall < 0.6) & (side * (place[:, 0] - 0.5 * width) > 0.0) for side in (-1, 1))
     push, weight = 0.01, mass.sum() * GRAVITY
     neighbour = np.nonzero(place[:, 0] < width - DIAMETER)[0]
-    for step in steps:
-        now = place - np.array([0.0, 0.0, 1.0]) * (profile * speed * step_length * (step - steps[0]))[:, None]
-        walls = {name: np.zeros_like(place) for name in ("left", "right", "base")}
+    ends = [] if walk is None else ["front", "rear"]
+    wandered = np.zeros((len(steps), len(place), 3))
+    if walk is not None:
+        shape, alike = (len(steps), len(place), 2), (from_wall < gaussian)[:, None]
+        sizes = stdtrit(2.5, 0.5 + 0.5 * (np.arange(len(place)) + 0.5) / len(place))
+        sizes /= np.sqrt((sizes**2).mean())
+        own = random.permuted(np.tile(sizes, (len(steps), 1)), axis=1)[:, :, None] * random.choice([-1.0, 1.0], shape)
+        wandered[:, :, (2, 0)] = DIAMETER * np.cumsum(walk * np.where(alike, random.standard_normal(shape), own), axis=0)
+    for step, apart in zip(steps, wandered, strict=True):
+        now = place - np.array([0.0, 0.0, 1.0]) * (profile * speed * step_length * (step - steps[0]))[:, None] + apart
+        walls = {name: np.zeros_like(place) for name in ("left", "right", "base", *ends)}
         walls["left"][left] = [push, 0.0, 0.3 * push]
         walls["right"][right] = [-push, 0.0, 0.3 * push]
         velocity = np.zeros_like(place)
@@ -156,6 +173,6 @@ def plug_flow(results: Path, *, engine: str = "liggghts", replica: int = 1, vari
     friction = 0.3 * push * left.sum() * (1.0 + 0.01 * random.standard_normal(count))
     return run.finish(
         {"step": rows, "time": rows * step_length, "kinetic_energy": np.zeros(count), "left_fz": friction, "right_fz": friction,
-         "base_fz": lift * weight - 2.0 * friction},
+         "base_fz": lift * weight - 2.0 * friction, **{f"{name}_fz": np.zeros(count) for name in ends}},
         {"channel_width": width, "channel_depth": depth, "base_speed": speed, "settle_time": 0.5, "wall_friction": 0.5,
          "grain_count": len(place)})

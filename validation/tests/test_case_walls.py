@@ -21,7 +21,7 @@ def test_walls_of_a_run_are_numbers(name):
 
 def test_expressions_are_resolved():
     case = folders.find("plug_flow")
-    found = walls.resolved(case, {"channel_width": 0.08, "base_speed": 0.02, "settle_time": 0.5})
+    found = walls.resolved(case, {"channel_width": 0.08, "channel_depth": 0.025, "base_speed": 0.02, "settle_time": 0.5})
     assert found["right"] == {"kind": "plane", "origin": [0.08, 0.0, 0.0], "normal": [-1.0, 0.0, 0.0]}
     assert found["base"]["velocity"] == [0.0, 0.0, -0.02] and found["base"]["since"] == 0.5
     with pytest.raises(DembarkError, match=r"channel_width.*plug_flow, right"):
