@@ -14,9 +14,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
-from dembark.validation.case.deck import prepare
+from dembark.validation.case.deck import prepare, write
 from dembark.validation.case.folders import find
-from dembark.validation.case.resolve import resolve
+from dembark.validation.case.resolve import portable, resolve
 
 CASE = find("mixing_drum")
 mixing = module("mixing_drum")
@@ -157,6 +157,14 @@ def test_a_drum_that_was_stopped_resumes_exactly(engine: str, decks: Any, tmp_pa
     before = {name: (one.folder / name).read_bytes() for name in ("time.csv", "grains.dump")}
     assert re.search(r"dembark: resumed at step \d+ exactly", one.run(restart_every=1000, resume="yes"))
     assert {name: (one.folder / name).read_bytes() for name in before} == before
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "lammps"])
+def test_the_friction_of_the_filling_ends_with_it(engine: str, tmp_path: Path) -> None:
+    write(CASE, engine, portable(resolve(CASE, None, "loose")), tmp_path)
+    filling, turning = (tmp_path / f"{engine}.in").read_text(encoding="utf-8").split("\nlabel ")
+    assert "${filling_friction}" in filling and "${small_large_friction}" not in filling
+    assert "${small_large_friction}" in turning and "${filling_friction}" not in turning
 
 
 def controls_mixing_drum(_folder: Path) -> Iterator[Control]:
