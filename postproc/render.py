@@ -15,10 +15,11 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -390,18 +391,9 @@ def _saved(image: Image, suffix: str, **how: Any) -> bytes:
     return buffer.getvalue()
 
 
-def _work(source: BinaryIO, target: BinaryIO) -> None:
-    """Draw what comes until nothing more does."""
-    while True:
-        try:
-            scene, camera = _receive(source)
-        except EOFError:
-            return
-        _send(target, _image(scene, camera))
-
-
 if __name__ == "__main__":
     # VTK may write to the standard output.
-    with os.fdopen(os.dup(1), "wb") as _out:
+    with os.fdopen(os.dup(1), "wb") as _out, suppress(EOFError):
         os.dup2(2, 1)
-        _work(sys.stdin.buffer, _out)
+        while True:
+            _send(_out, _image(*_receive(sys.stdin.buffer)))
