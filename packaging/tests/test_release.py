@@ -18,7 +18,7 @@ def text(name: str) -> str:
 
 def test_the_version_is_that_of_pyproject():
     assert yaml.safe_load(text("CITATION.cff"))["version"] == PROJECT["version"]
-    assert re.search(r"^## \[(\d.+?)\]", text("CHANGELOG.md"), re.MULTILINE)[1] == PROJECT["version"]
+    assert re.search(r"^## \[(.+?)\]", text("CHANGELOG.md"), re.MULTILINE)[1] == PROJECT["version"]
     assert "VERSION" not in re.search(r"^project\(.*\)$", text("CMakeLists.txt"), re.MULTILINE)[0]
 
 
