@@ -6,7 +6,7 @@ from .errors import DembarkError
 
 EXTRAS = {**dict.fromkeys(("xarray", "h5netcdf", "h5py", "pyvista", "vtkmodules"), "fields"),
           **dict.fromkeys(("matplotlib", "mpl_toolkits", "PIL", "weasyprint"), "report"),
-          "SALib": "campaigns"}
+          **dict.fromkeys(("SALib", "emcee", "sklearn"), "campaigns")}
 
 
 def install_line(extra: str) -> str:

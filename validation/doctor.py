@@ -21,7 +21,7 @@ from dembark.validation.case import folders
 # By the extra that installs them; "" is without any.
 _PACKAGES = {"": ("numpy", "scipy", "pandas", "MDAnalysis", "filelock", "jinja2", "pint", "rich", "typer"),
              "fields": ("xarray", "h5netcdf", "h5py", "pyvista"), "report": ("matplotlib", "weasyprint"),
-             "campaigns": ("SALib",)}
+             "campaigns": ("SALib", "emcee", "scikit-learn")}
 
 
 @dataclass(frozen=True)

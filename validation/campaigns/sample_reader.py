@@ -9,13 +9,14 @@ from typing import Any
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.units import finite, to_si
-from dembark.validation.case.model import Case, Parameter
+from dembark.validation.case.model import Case, Declared, Parameter
 from dembark.validation.case.tables import TableReader, Types
 
 from .plan import MOST_RUNS
-from .sampling import DESIGNS, DISTRIBUTIONS, Sample, Variable
+from .sampling import DESIGNS, DISTRIBUTIONS, Sample, Target, Variable
 
-_KEYS: dict[str, Types] = {"design": str, "samples": int, "seed": int, "quantities": list, "parameters": dict}
+_KEYS: dict[str, Types] = {"design": str, "samples": int, "seed": int, "quantities": list, "parameters": dict,
+                           "targets": dict}
 _NUMBER = (int, float, str)
 
 
@@ -43,7 +44,8 @@ class SampleReader(TableReader):
         if not given:
             raise self.fail(table, "the sample has no parameters", "give it one: wall_friction = { min = 0.2, max = 0.8 }")
         variables = {key: self.variable(f"{table}.parameters", key, one, case) for key, one in given.items()}
-        sample = Sample(design, entry["samples"], variables, entry.get("seed", 0), self.quantities(table, entry, case))
+        sample = Sample(design, entry["samples"], variables, entry.get("seed", 0), self.quantities(table, entry, case),
+                        self.targets(f"{table}.targets", entry.get("targets", {}), case))
         if sample.count > MOST_RUNS:
             raise self.fail(table, f"samples = {sample.samples} makes {sample.count} points", f"a campaign may have {MOST_RUNS} runs")
         self.suited(table, sample)
@@ -56,6 +58,8 @@ class SampleReader(TableReader):
                 if "min" not in one.numbers:
                     raise self.fail(f"{table}.parameters.{name}", f"{one.distribution} has no limits, which the design morris needs",
                                     'take "truncnorm" or another with min and max')
+        if sample.design == "morris" and sample.targets:
+            raise self.fail(table, "the design morris has targets", "its points lie on four levels: fit with sobol or latin_hypercube")
         if sample.design == "saltelli" and sample.samples & (sample.samples - 1):
             below = 2 ** (sample.samples.bit_length() - 1)
             raise self.fail(table, f"samples = {sample.samples} of the design saltelli", f"give a power of 2: {below} or {2 * below}")
@@ -65,9 +69,27 @@ class SampleReader(TableReader):
         names = entry.get("quantities", [])
         self.texts(entry, table, ["quantities"])
         for name in names:
-            if case.declared(name) is None:
-                pick(name, case.quantities, "quantity", f"{self.where(table)}, case {case.name} does not measure it")
+            self.measured(table, name, case)
         return tuple(names)
+
+    def measured(self, table: str, name: str, case: Case) -> Declared:
+        """The declaration of the quantity `name`; DembarkError when the case does not measure it."""
+        if (found := case.declared(name)) is None:
+            pick(name, case.quantities, "quantity", f"{self.where(table)}, case {case.name} does not measure it")
+            raise AssertionError
+        return found[0]
+
+    def targets(self, table: str, entry: Mapping[str, Any], case: Case) -> dict[str, Target]:
+        """What the parameters are to be fitted to, by the name of the quantity."""
+        found = {}
+        for name, given in entry.items():
+            unit, place = self.measured(table, name, case).unit, f"{table}.{name}"
+            self.table(given, place, {"value": _NUMBER, "uncertainty": _NUMBER}, ("value", "uncertainty"))
+            found[name] = Target(self.quantity(place, given["value"], unit, f"value of {name}"),
+                                 self.quantity(place, given["uncertainty"], unit, f"uncertainty of {name}"))
+            if found[name].uncertainty <= 0.0:
+                raise self.fail(place, f"uncertainty of {name} = {found[name].uncertainty:g} is out of range", "it must be > 0")
+        return found
 
     def quantity(self, table: str, given: Any, unit: str, name: str) -> float:
         """A finite number in `unit`; `name` is what it was given for."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -74,6 +74,14 @@ class Variable:
 
 
 @dataclass(frozen=True)
+class Target:
+    """What a measured quantity is to be: `value` with its standard `uncertainty`, in the unit of the quantity."""
+
+    value: float
+    uncertainty: float
+
+
+@dataclass(frozen=True)
 class Drawn:
     """The points of a sample, in their order: `rows` of values by parameter, their `quantiles`, and how many points of the sequence were
     `left_out` because they break a condition."""
@@ -86,13 +94,14 @@ class Drawn:
 @dataclass(frozen=True)
 class Sample:
     """`samples` points, or groups of GROUPS, of a `design` over `variables`, from the random `seed`; `quantities` are those that the report
-    looks at, all that are checked or compared if there are none."""
+    looks at, all that are checked or compared if there are none; `targets` those that the parameters are fitted to."""
 
     design: str
     samples: int
     variables: Mapping[str, Variable]
     seed: int = 0
     quantities: tuple[str, ...] = ()
+    targets: Mapping[str, Target] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -102,6 +111,7 @@ class Sample:
     def facts(self) -> dict[str, Any]:
         """For `plan.json`."""
         return {"design": self.design, "samples": self.samples, "seed": self.seed, "quantities": list(self.quantities),
+                **({"targets": {name: [one.value, one.uncertainty] for name, one in self.targets.items()}} if self.targets else {}),
                 "parameters": {name: one.words for name, one in self.variables.items()}}
 
     def draw(self, broken: Callable[[Row], str]) -> Drawn:

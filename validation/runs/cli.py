@@ -51,17 +51,36 @@ def show_campaigns() -> None:
 def submit(campaign: File, dry_run: Dry = False, executor: Executor = None, out: Out = None, cores: Cores = None,
            jobs: Jobs = None, write_only: WriteOnly = False) -> None:
     """Run a campaign here, or submit it to a cluster. It makes all runs, their measurements and the report; what is finished is kept."""
-    file, chosen = locate(campaign), folder.choose(executor or "local", cores, jobs)
+    _start(locate(campaign), dry_run, executor, out, cores, jobs, write_only)
+
+
+@app.command()
+def calibrate(campaign: File, dry_run: Dry = False, executor: Executor = None, out: Out = None, cores: Cores = None,
+              jobs: Jobs = None, write_only: WriteOnly = False) -> None:
+    """Fit parameters to targets. It runs a campaign whose sample has targets, as 'submit' does; its report has the fit."""
+    file = locate(campaign)
+    if not any(sweep.sample and sweep.sample.targets for sweep in read(file).sweeps):
+        raise DembarkError(f"{file} has no targets", "", "give them in [sweeps.sample.targets]: NAME = { value = ..., uncertainty = ... }")
+    target = _start(file, dry_run, executor, out, cores, jobs, write_only)
+    for path in sorted(target.glob("calibration/*/*/*/fitted.toml")):
+        show.console().print(str(path), markup=False, soft_wrap=True)
+
+
+def _start(file: Path, dry_run: bool, executor: str | None, out: Path | None, cores: int | None, jobs: int | None,
+           write_only: bool) -> Path:
+    """Run or submit the campaign `file`, or show its runs; returns its folder."""
+    chosen = folder.choose(executor or "local", cores, jobs)
     where = _site(chosen)
     plan = expand.campaign(read(file))
     target = (out or Path("results") / "campaigns" / plan.label).resolve()
     if not dry_run:
         _submit(plan, file, target, chosen, where, write_only)
-        return
+        return target
     folder.refuse_foreign(target, plan.label)
     _check(chosen, plan, where, write_only)
     found = estimate.estimates(plan, estimate.Rates(target))
     estimate.dry_run(show.console(), plan, found, target, None if where else _cores(chosen))
+    return target
 
 
 @app.command()

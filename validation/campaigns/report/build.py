@@ -7,6 +7,7 @@ from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import write_atomic
+from dembark.validation.campaigns.spec import SweepSpec, read
 from dembark.validation.judge.result import Comparison
 from dembark.validation.judge.tally import tally
 from dembark.validation.report.build import write
@@ -14,7 +15,7 @@ from dembark.validation.report.figures import engine_name
 from dembark.validation.report.gather import ReportData, gather
 from dembark.validation.report.sections import embed
 
-from . import figures, sensitivity, tables
+from . import calibration, figures, sensitivity, tables
 from .sweeps import Point, Sweep, numerical_errors, sweeps
 
 # A page that shows everything shows nothing: the rest is in the tables.
@@ -39,11 +40,15 @@ def build(folder: Path) -> Path:
 
 def _chapters(gathered: ReportData, drawn: Path) -> dict[str, Any]:
     found = sweeps(gathered.summary.get("sweeps", ()), gathered.pages, gathered.cases)
+    file = gathered.folder / "campaign.toml"
+    # Conditions between parameters, which a fit keeps, are in the file only.
+    specs = read(file).sweeps if file.is_file() and any(one.sample.get("targets") for one in found) else (None,) * len(found)
     return {"title": f"Campaign {gathered.summary.get('campaign') or gathered.folder.name}",
-            "sweeps": [_sweep(one, gathered, drawn) for one in found], "errors": numerical_errors(found)}
+            "sweeps": [_sweep(one, spec, gathered, drawn) for one, spec in zip(found, specs, strict=True)],
+            "errors": numerical_errors(found)}
 
 
-def _sweep(sweep: Sweep, gathered: ReportData, drawn: Path) -> dict[str, Any]:
+def _sweep(sweep: Sweep, spec: SweepSpec | None, gathered: ReportData, drawn: Path) -> dict[str, Any]:
     quantities = sweep.quantities()
     # A sample has a panel for each parameter.
     chosen, name = quantities[:max(1, _PANELS // len(sweep.axes)) if sweep.sample else _PANELS], sweep.name
@@ -61,9 +66,17 @@ def _sweep(sweep: Sweep, gathered: ReportData, drawn: Path) -> dict[str, Any]:
     if bars := figures.sensitivity_figure(effects, _PANELS):
         sensitivity.write_csv(drawn / f"{name}-sensitivity.csv", effects)
         shown.append(embed(bars, drawn, f"{name}-sensitivity", _BARS[sweep.sample["design"]], [f"{name}-sensitivity.csv"]))
+    fits = calibration.fits(sweep, spec) if spec else []
+    for one in fits:
+        if spec and (posterior := figures.posterior_figure(sweep, one)):
+            place = Path("calibration", name, one.base, one.engine)
+            calibration.write_files(gathered.folder / place, str(gathered.summary["campaign"]), one, spec)
+            shown.append(embed(posterior, drawn, f"{name}-posterior-{one.base}-{one.engine}",
+                               f"{engine_name(one.engine)}: posterior; dashed: 95 % intervals, cross: most probable point.",
+                               [f"../{place}/{file}" for file in ("posterior.csv", "fitted.toml")]))
     compared = {page.variant: page.comparison for page in gathered.pages if page.case == sweep.case}
     return {"sweep": sweep, "shown": len(chosen), "left_out": len(quantities) - len(chosen), "figures": shown,
-            "effects": effects, "negligible": sensitivity.negligible_everywhere(effects),
+            "fits": fits, "effects": effects, "negligible": sensitivity.negligible_everywhere(effects),
             "verdicts": [_verdicts(sweep, point, compared.get(point.variant)) for point in sweep.points]}
 
 

@@ -14,6 +14,7 @@ from dembark.postproc.style import GREY, SEQUENTIAL, STYLE
 from dembark.validation.judge.result import QuantityRecord
 from dembark.validation.report.figures import MARKS, WIDE, colour, engine_name, symbols
 
+from .calibration import Fit
 from .sensitivity import Sensitivity
 from .sweeps import Sweep, words
 
@@ -116,6 +117,35 @@ def sensitivity_figure(found: Sequence[Sensitivity], panels: int) -> Figure | No
                 axes.set_title(_title(one.quantity, 30), fontsize=7.0)
             axes.invert_yaxis()
         figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=min(4, len(handles)), fontsize=6.8)
+    return figure
+
+
+def posterior_figure(sweep: Sweep, fit: Fit) -> Figure | None:
+    """Marginal densities of the fitted parameters on the diagonal, joint ones below, with the most probable point. None without a fit."""
+    if fit.values is None:
+        return None
+    count = len(fit.parameters)
+    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
+        figure = Figure(figsize=(WIDE, WIDE * 0.28 * count + 0.4))
+        drawn = figure.subplots(count, count, squeeze=False, gridspec_kw={"wspace": 0.35, "hspace": 0.35})
+        for row, below in enumerate(fit.parameters):
+            for column, left in enumerate(fit.parameters):
+                axes = drawn[row, column]
+                if column > row:
+                    axes.set_axis_off()
+                    continue
+                if row == column:
+                    axes.hist(fit.values[:, row], bins=40, color=colour(fit.engine), density=True)
+                    axes.set_yticks([])
+                    for end in (left.low, left.high):
+                        axes.axvline(end, color=GREY, linewidth=0.8, linestyle=_DASHES[1])
+                else:
+                    axes.hist2d(fit.values[:, column], fit.values[:, row], bins=40, cmap=SEQUENTIAL)
+                    axes.plot(left.best, below.best, marker="+", color="white")
+                if row == count - 1:
+                    axes.set_xlabel(sweep.label(left.name))
+                if column == 0 and row:
+                    axes.set_ylabel(sweep.label(below.name))
     return figure
 
 

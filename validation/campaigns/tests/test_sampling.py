@@ -226,6 +226,53 @@ def test_a_mistake_gets_one_line(name: str, tmp_path: Path, capsys: pytest.Captu
     assert error.count("\n") == 1 and error.startswith("dembark: ") and expected in error and "campaign.toml" in error
 
 
+FIT = SAMPLE.replace('"box"', '"silo"').replace(DIAMETER, "wall_friction = { min = 0.2, max = 0.8 }\n") + "[sweeps.sample.targets]\n"
+
+
+@pytest.mark.parametrize(("target", "expected"), [
+    ('apparent_mass_ratio = { value = "0.6", uncertainty = 0.02 }', ""),
+    ("apparent_mas_ratio = { value = 0.6, uncertainty = 0.02 }", "silo does not measure it, did you mean apparent_mass_ratio"),
+    ("apparent_mass_ratio = 0.6", "0.6 is not a table"),
+    ("apparent_mass_ratio = { value = 0.6 }", "uncertainty is missing, [sweeps 1.sample.targets.apparent_mass_ratio] of"),
+    ("apparent_mass_ratio = { value = 0.6, uncertainty = 0 }", "uncertainty of apparent_mass_ratio = 0 is out of range"),
+    ('apparent_mass_ratio = { value = "30 deg", uncertainty = 0.02 }', "value of apparent_mass_ratio: "),
+])
+def test_targets(target: str, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.delenv("DEMBARK_DECKS")
+    path = write(tmp_path, FIT + target + "\n")
+    if not expected:
+        (found,) = read(path).sweeps[0].sample.targets.values()
+        assert (found.value, found.uncertainty) == (0.6, 0.02)
+        return
+    assert main(["calibrate", str(path), "--dry-run"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and expected in error
+
+
+def test_a_fit_needs_targets_and_a_design_that_fills_the_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                                capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.delenv("DEMBARK_DECKS")
+    target = "apparent_mass_ratio = { value = 0.6, uncertainty = 0.02 }\n"
+    for text, expected in ((FIT, "campaign.toml has no targets, give them in [sweeps.sample.targets]"),
+                           (FIT.replace("sobol", "morris") + target, "the design morris has targets")):
+        assert main(["calibrate", str(write(tmp_path, text)), "--dry-run"]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and expected in error
+
+
+@pytest.mark.usefixtures("stand_in_analysis")
+def test_a_calibration_runs_as_a_campaign_does(tmp_path: Path, decks: Path, command: Callable[..., tuple[int, str, str]]) -> None:
+    with (decks / "box/case.toml").open("a") as file:
+        file.write('[quantities]\nrepose = { label = "angle of repose", unit = "deg" }\n')
+    write(tmp_path, SAMPLE + '[sweeps.sample.targets]\nrepose = { value = "0.5 rad", uncertainty = 1.0 }\n')
+    code, out, _ = command("calibrate", "campaign.toml", "--dry-run")
+    assert code == 0 and "boxes: 5 runs" in out
+    code, out, error = command("calibrate", "campaign.toml", "--out", "o")
+    assert code == 0 and "5 of 5 runs finished" in out, error
+    (target,) = read(tmp_path / "o/campaign.toml").sweeps[0].sample.targets.values()
+    assert target.value == pytest.approx(math.degrees(0.5))
+
+
 def test_a_quantity_that_the_case_does_not_measure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DEMBARK_DECKS")
     text = SAMPLE.replace('"box"', '"silo"').replace("seed = 3", 'quantities = ["apparent_mass_ratio"]')

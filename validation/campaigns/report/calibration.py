@@ -1,0 +1,194 @@
+"""Parameters of a sample that were fitted to targets: what is known of each, the best run, and files with the result."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from dembark.common.files import write_atomic
+from dembark.validation.campaigns.sampling import Sample
+from dembark.validation.campaigns.spec import SweepSpec
+from dembark.validation.case.resolve import merged
+
+from .posterior import Array, Output, Posterior, everywhere, posterior
+from .sensitivity import variance_of_mean
+from .sweeps import Point, Sweep
+
+# Points that a fit needs, for each parameter.
+LEAST_POINTS = 5
+# Standard deviation of the quantile of a parameter over that of its prior: below it is identified, above it is not.
+IDENTIFIED, UNIDENTIFIED = 1.0 / 3.0, 0.8
+# Correlation of two parameters from which on only a combination of them is known.
+COMBINED = 0.8
+# Share of the variance of a quantity that its surrogate has to predict.
+PREDICTED = 0.8
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A parameter: median and 95 % interval of its posterior, most probable value, and how its width is to that of the prior."""
+
+    name: str
+    median: float
+    low: float
+    high: float
+    best: float
+    width: float
+
+    @property
+    def standing(self) -> str:
+        """identified, partly identified or not identified."""
+        return "identified" if self.width < IDENTIFIED else "not identified" if self.width > UNIDENTIFIED else "partly identified"
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A target, what the surrogate gives at the most probable point, with the half-width of its 95 % interval, and the share of the
+    variance that it predicts of points that it has not seen."""
+
+    name: str
+    target: float
+    uncertainty: float
+    value: float
+    half: float
+    predicted: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The fit in one engine and variant: parameters, targets, and the folder name `best_run` of the point whose measurements are nearest to
+    the targets; `values` (n, parameters) are samples of the posterior. `why` there is no fit, "" where there is."""
+
+    engine: str
+    base: str
+    parameters: tuple[Fitted, ...] = ()
+    targets: tuple[Reached, ...] = ()
+    combined: tuple[tuple[str, str, float], ...] = ()
+    best_run: str = ""
+    values: Array | None = None
+    density: Array | None = None
+    why: str = ""
+
+    @property
+    def words(self) -> list[str]:
+        """What is known and what is not, in sentences."""
+        return list(self._words())
+
+    def _words(self) -> Iterator[str]:
+        for standing in ("identified", "partly identified", "not identified"):
+            if names := [one.name.replace("_", " ") for one in self.parameters if one.standing == standing]:
+                yield f"{standing.capitalize()}: {', '.join(names)}."
+        for one, other, rho in self.combined:
+            yield (f"Only a combination of {one.replace('_', ' ')} and {other.replace('_', ' ')} is known (correlation {rho:.2f}): another "
+                   "target, in which they act differently, would separate them.")
+        for each in self.targets:
+            if each.predicted < PREDICTED:
+                yield (f"The surrogate predicts only {max(0.0, each.predicted):.0%} of the variance of {each.name.replace('_', ' ')}: "
+                       "more samples are needed, or more packings.")
+            if abs(each.value - each.target) > each.half + 1.96 * each.uncertainty:
+                yield f"No parameters within the ranges reach the target of {each.name.replace('_', ' ')}."
+
+
+def fits(sweep: Sweep, spec: SweepSpec) -> list[Fit]:
+    """The fit in each engine and variant; none where the sample has no targets."""
+    if spec.sample is None or not spec.sample.targets:
+        return []
+    return [_fit(spec, spec.sample, engine, base, [one for one in sweep.points if one.values.get("variant", base) == base])
+            for engine in sweep.engines for base in spec.variants]
+
+
+def _fit(spec: SweepSpec, sample: Sample, engine: str, base: str, points: Sequence[Point]) -> Fit:
+    found = [(point, [point.quantity(engine, name) for name in sample.targets]) for point in points]
+    complete = [(point, [one for one in row if one]) for point, row in found if all(row)]
+    least = LEAST_POINTS * len(sample.variables)
+    if len(complete) < least:
+        return Fit(engine, base, why=f"{len(complete)} points with all targets were measured, {least} are needed")
+    places = np.array([point.quantiles for point, _ in complete], float)
+    values = np.array([[one.value for one in row] for _, row in complete], float)
+    variances = np.array([[variance_of_mean(one) or 0.0 for one in row] for _, row in complete])
+    outputs = [Output(name, values[:, at], variances[:, at], one.value, one.uncertainty)
+               for at, (name, one) in enumerate(sample.targets.items())]
+    if still := [one.name for one in outputs if not np.ptp(one.values) > 0.0]:
+        return Fit(engine, base, why=f"{still[0]} is the same at all points")
+    known = posterior(places, outputs, _allowed(spec, sample, base))
+    distance = ((values - [one.target for one in outputs]) ** 2 / (variances + [one.uncertainty**2 for one in outputs])).sum(axis=1)
+    drawn = np.array([one.values(known.quantiles[:, at]) for at, one in enumerate(sample.variables.values())], float).T
+    return Fit(engine, base, _parameters(sample, known, drawn), tuple(_reached(known, outputs)), tuple(_combined(sample, known)),
+               complete[int(distance.argmin())][0].variant, drawn, known.density)
+
+
+def _allowed(spec: SweepSpec, sample: Sample, base: str) -> Callable[[Array], bool]:
+    """Whether a point breaks no condition of the case, and no range of a parameter."""
+    variables = list(sample.variables.values())
+    everything = bool(spec.derived) or any("min" not in one.numbers for one in variables)
+    # Of those that the sampled parameters have no part in, each point keeps all.
+    conditions = [one for one in spec.case.constraints if one.expression.names & sample.variables.keys()]
+    if not everything and not conditions:
+        return everywhere
+    fixed = merged(spec.case, spec.profile, base, spec.fixed)
+
+    def allowed(place: Array) -> bool:
+        values = [one.values(place[at:at + 1])[0] for at, one in enumerate(variables)]
+        row = dict(zip(sample.variables, values, strict=True))
+        if everything:
+            return not spec.broken(row, (base,))
+        return all(one.expression(fixed | row) in (None, True) for one in conditions)
+
+    return allowed
+
+
+def _parameters(sample: Sample, known: Posterior, drawn: Array) -> tuple[Fitted, ...]:
+    best = drawn[int(known.density.argmax())]
+    widths = known.quantiles.std(axis=0) * math.sqrt(12.0)
+    low, median, high = np.quantile(drawn, [0.025, 0.5, 0.975], axis=0)
+    return tuple(Fitted(name, *(float(one[at]) for one in (median, low, high, best, widths))) for at, name in enumerate(sample.variables))
+
+
+def _reached(known: Posterior, outputs: Sequence[Output]) -> Iterator[Reached]:
+    best = known.quantiles[int(known.density.argmax())][None]
+    for surrogate, one in zip(known.surrogates, outputs, strict=True):
+        mean, variance = surrogate(best)
+        yield Reached(one.name, one.target, one.uncertainty, float(mean[0]), 1.96 * math.sqrt(float(variance[0])), surrogate.explained)
+
+
+def _combined(sample: Sample, known: Posterior) -> Iterator[tuple[str, str, float]]:
+    from scipy.stats import spearmanr
+
+    names = list(sample.variables)
+    for at, one in enumerate(names):
+        for other in range(at + 1, len(names)):
+            rho = float(spearmanr(known.quantiles[:, at], known.quantiles[:, other]).statistic)
+            if abs(rho) > COMBINED:
+                yield one, names[other], rho
+
+
+def write_files(folder: Path, name: str, fit: Fit, spec: SweepSpec) -> None:
+    """Write `posterior.csv`, samples with their log density, and `fitted.toml`, a campaign of the most probable point, into `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    table = pd.DataFrame(fit.values, columns=[one.name for one in fit.parameters]).assign(log_density=fit.density)
+    write_atomic(folder / "posterior.csv", table.to_csv(index=False).encode())
+    write_atomic(folder / "fitted.toml", fitted_toml(name, fit, spec).encode())
+
+
+def fitted_toml(name: str, fit: Fit, spec: SweepSpec) -> str:
+    """A campaign with one point, the most probable one, to check the fit in the engine itself."""
+    best = {one.name: round(one.best) if spec.case.parameters[one.name].is_whole else one.best for one in fit.parameters}
+    lines = ["# The most probable parameters; median and 95 % interval of each:",
+             *(f"# {one.name}: {one.median:.4g}, {one.low:.4g} to {one.high:.4g}, {one.standing}" for one in fit.parameters),
+             "[campaign]", f"name = {json.dumps(f'{name}-fitted')}", "", "[[sweeps]]", f"case = {json.dumps(spec.case.name)}",
+             f"profile = {json.dumps(spec.profile)}", f"variant = {json.dumps(fit.base)}", f"engines = {json.dumps([fit.engine])}",
+             *([f"replicas = {spec.replicas}"] if spec.replicas else []), f"list = [{_table(best)}]", f"fixed = {_table(spec.fixed)}",
+             f"derived = {_table({key: one.text for key, one in spec.derived.items()})}", ""]
+    return "\n".join(lines)
+
+
+def _table(values: Mapping[str, Any]) -> str:
+    """An inline table of TOML; None is `auto`."""
+    return "{ " + ", ".join(f"{key} = {json.dumps('auto' if value is None else value)}" for key, value in values.items()) + " }"

@@ -1,0 +1,164 @@
+"""Parameters that made synthetic targets are found again, and what cannot be known is said."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import qmc
+
+from dembark.postproc.statistics import replica_mean
+from dembark.validation.campaigns.expand import _sweeps, points
+from dembark.validation.campaigns.report import calibration
+from dembark.validation.campaigns.report.build import build
+from dembark.validation.campaigns.report.posterior import Output, log_density, posterior
+from dembark.validation.campaigns.report.sweeps import sweeps
+from dembark.validation.campaigns.spec import CampaignSpec, read
+from dembark.validation.case import folders
+from dembark.validation.judge.result import QuantityRecord, Result, write
+from dembark.validation.report.gather import Page
+
+CAMPAIGN = """
+[campaign]
+name = "fit"
+profile = "quick"
+replicas = 5
+[[sweeps]]
+case = "silo"
+variant = "sliding"
+engines = ["liggghts"]
+fixed = { grain_diameter = "6 mm" }
+[sweeps.sample]
+design = "sobol"
+samples = 32
+[sweeps.sample.parameters]
+wall_friction = { min = 0.2, max = 0.8 }
+youngs_modulus = { distribution = "loguniform", min = "5 MPa", max = "500 MPa" }
+[sweeps.sample.targets]
+apparent_mass_ratio = { value = 0.6, uncertainty = 0.02 }
+stress_ratio_k = { value = 0.5, uncertainty = 0.02 }
+"""
+Place = np.ndarray
+Model = Callable[[Place], tuple[float, float]]
+
+
+def curved(x: Place) -> tuple[float, float]:
+    """Two quantities that two parameters determine."""
+    return np.sin(2.0 * x[0]) + 0.3 * x[1], x[0] * x[1] + 0.5 * x[1] ** 2
+
+
+def hits(repetitions: range) -> tuple[int, int]:
+    """How many times in `repetitions` the true parameters are in the joint 95 % region, and all in their 95 % intervals.
+
+    A stand-in for an engine, whose packings scatter by 0.05, five at each of 32 points; the targets scatter by their uncertainty.
+    """
+    joint = single = 0
+    for seed in repetitions:
+        random = np.random.default_rng(seed)
+        places = qmc.Sobol(2, seed=random).random(32)
+        packings = np.array([curved(place) for place in places])[:, None] + 0.05 * random.standard_normal((32, 5, 2))
+        truth = random.uniform(size=2)
+        targets = np.array(curved(truth)) + 0.03 * random.standard_normal(2)
+        outputs = [Output(str(at), packings.mean(axis=1)[:, at], packings.var(axis=1, ddof=1)[:, at] / 5.0, targets[at], 0.03)
+                   for at in range(2)]
+        found = posterior(places, outputs, seed=seed)
+        joint += log_density(found.surrogates, outputs, truth[None])[0] >= np.quantile(found.density, 0.05)
+        low, high = np.quantile(found.quantiles, [0.025, 0.975], axis=0)
+        single += bool(((low <= truth) & (truth <= high)).all())
+    return joint, single
+
+
+def test_true_parameters_are_found_again() -> None:
+    joint, _ = hits(range(5))
+    assert joint >= 4
+
+
+@pytest.mark.full
+def test_true_parameters_are_within_the_stated_region_as_often_as_it_says() -> None:
+    joint, _ = hits(range(100))
+    assert joint >= 90
+
+
+def measured(folder: Path, model: Model, text: str = CAMPAIGN) -> tuple[CampaignSpec, dict, list[Result]]:
+    """The campaign with results of `model`, whose packings scatter by 0.02."""
+    (folder / "campaign.toml").write_text(text)
+    spec, random, found = read(folder / "campaign.toml"), np.random.default_rng(3), []
+    all_points = points(spec)
+    for point in all_points:
+        quantities = []
+        for name, value in zip(("apparent_mass_ratio", "stress_ratio_k"), model(np.array(point.quantiles)), strict=True):
+            estimate = replica_mean(list(value + 0.02 * random.standard_normal(5)))
+            quantities.append(QuantityRecord(name, estimate.value, "info", interval=(estimate.value - estimate.half,
+                                                                                     estimate.value + estimate.half), basis=estimate.basis))
+        found.append(Result("silo", point.variant, "liggghts", tuple(quantities), parameters=dict(point.values), provenance={
+            "commit": "a" * 40, "replicas": 5, "steps": 9, "time_step": 1.0, "wall_time": 2.0}))
+    return spec, {"campaign": "fit", "sweeps": _sweeps(spec, all_points), "runs": []}, found
+
+
+def fit(folder: Path, model: Model, text: str = CAMPAIGN, keep: int = 1000) -> calibration.Fit:
+    spec, facts, found = measured(folder, model, text)
+    pages = [Page(one.case, one.variant, Path(), results={one.engine: one}) for one in found[:keep]]
+    (result,) = calibration.fits(sweeps(facts["sweeps"], pages, folders.discover())[0], spec.sweeps[0])
+    return result
+
+
+def test_what_two_targets_tell_of_two_parameters(tmp_path: Path) -> None:
+    found = fit(tmp_path, lambda x: (0.2 + 0.8 * x[0], x[1]))
+    friction, modulus = found.parameters
+    # Half of the range of one, the geometric mean of that of the other.
+    assert friction.low < 0.5 < friction.high and friction.high - friction.low < 0.1
+    assert modulus.low < 5e7 < modulus.high < 5e7 * 1.5
+    assert found.words == ["Identified: wall friction, youngs modulus."] and found.best_run.startswith("sliding_wall_friction=0.")
+    assert all(one.predicted > 0.99 for one in found.targets)
+
+
+def test_a_parameter_without_effect_is_not_identified(tmp_path: Path) -> None:
+    found = fit(tmp_path, lambda x: (0.2 + 0.8 * x[0], x[0]))
+    assert found.words == ["Identified: wall friction.", "Not identified: youngs modulus."]
+
+
+def test_what_acts_in_the_same_way_is_known_in_combination_only(tmp_path: Path) -> None:
+    found = fit(tmp_path, lambda x: (0.1 + 0.5 * (x[0] + x[1]), 0.5 * (x[0] + x[1])))
+    assert any("Only a combination of wall friction and youngs modulus is known" in line for line in found.words)
+    assert found.combined[0][2] < -0.8
+
+
+def test_a_target_out_of_reach_is_said(tmp_path: Path) -> None:
+    found = fit(tmp_path, lambda x: (0.1 * x[0], x[1]))
+    assert "No parameters within the ranges reach the target of apparent mass ratio." in found.words
+
+
+def test_too_few_points_and_a_constant_are_not_fitted(tmp_path: Path) -> None:
+    assert fit(tmp_path, lambda x: (x[0], x[1]), keep=9).why == "9 points with all targets were measured, 10 are needed"
+
+
+def test_a_fit_keeps_the_conditions_of_the_case(tmp_path: Path) -> None:
+    """The kinetic friction may not exceed the static one; without this the target would be reached beyond."""
+    text = CAMPAIGN.replace("wall_friction =", "static_friction =").replace(
+        'youngs_modulus = { distribution = "loguniform", min = "5 MPa", max = "500 MPa" }', "kinetic_friction = { min = 0.2, max = 0.8 }")
+    text = text.replace("stress_ratio_k = { value = 0.5, uncertainty = 0.02 }", "")
+    found = fit(tmp_path, lambda x: (0.4 + x[1] - x[0], 0.5), text)
+    assert found.values is not None and (found.values[:, 1] <= found.values[:, 0] + 1e-12).all()
+
+
+def test_the_report_has_the_fit_and_its_files(tmp_path: Path) -> None:
+    spec, facts, found = measured(tmp_path, lambda x: (0.2 + 0.8 * x[0], x[1]))
+    for one in found:
+        place = tmp_path / one.case / one.variant / one.engine
+        place.mkdir(parents=True)
+        write(place / "metrics.json", one)
+    (tmp_path / "plan.json").write_text(json.dumps(facts))
+    text = build(tmp_path).read_text(encoding="utf-8")
+    assert "Identified: wall friction, youngs modulus." in text and (tmp_path / "figures/silo-1-posterior-sliding-liggghts.svg").is_file()
+    place = tmp_path / "calibration/silo-1/sliding/liggghts"
+    table = pd.read_csv(place / "posterior.csv")
+    assert list(table) == ["wall_friction", "youngs_modulus", "log_density"] and 0.45 < table["wall_friction"].median() < 0.55
+    fitted = tomllib.loads((place / "fitted.toml").read_text())
+    (point,) = points(read(place / "fitted.toml"))
+    assert point.values == fitted["sweeps"][0]["list"][0] and 0.45 < point.values["wall_friction"] < 0.55
+    assert point.resolved["grain_diameter"] == spec.sweeps[0].fixed["grain_diameter"] and point.resolved["replicas"] == 5
