@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 import time as clock
@@ -219,15 +220,14 @@ def debark(
     energy: Annotated[float | None, typer.Option(parser=positive("J/m^2", "--energy"), metavar="TEXT", help=(
         "Or: energy of friction per area that takes bark off: '2 kJ/m^2'."))] = None,
     speed: Annotated[float | None, typer.Option(parser=positive("rad/s", "--speed"), metavar="TEXT", help=(
-        "Speed of the drum: '11.5 rpm'; default: that of the run."))] = None,
-    begin: Annotated[float | None, typer.Option(min=0.0, help="Begin of the window in s; default: after the run-in of the run.")] = None,
-    end: Annotated[float | None, typer.Option(min=0.0, help="Its end in s; default: the last impact, or that of the run.")] = None,
-    least_speed: Annotated[float | None, typer.Option(min=0.0, help=(
-        "Approach (m/s) from which a contact is an impact; default: that of the run, or 0."))] = None,
+        "Speed of the drum: '11.5 rpm'. Required."))] = None,
+    begin: Annotated[float, typer.Option(min=0.0, help="Begin of the window in s, after the run-in.")] = 0.0,
+    end: Annotated[float | None, typer.Option(min=0.0, help="Its end in s; default: that of the run, or the last impact.")] = None,
+    least_speed: Annotated[float, typer.Option(min=0.0, help="Approach (m/s) from which a contact is an impact.")] = 0.0,
     stiffness: Annotated[float | None, typer.Option(parser=positive("N/m", "--stiffness"), metavar="TEXT", help=(
-        "Local stiffness of a log, for the wood-loss index; default: that of the run."))] = None,
+        "Local stiffness of a log, for the wood-loss index."))] = None,
     length_: Annotated[float | None, typer.Option("--length", parser=positive("m", "--length"), metavar="TEXT", help=(
-        "Length of the logs; default: that of the run."))] = None,
+        "Length of the logs."))] = None,
     sectors: Annotated[int, typer.Option(min=1, max=3600, help="Sectors of the circumference.")] = 12,
     out: Annotated[Path | None, typer.Option(help="NetCDF file of doses and degree, for xarray.")] = None,
     plot: Plot = None,
@@ -241,9 +241,11 @@ def debark(
         raise DembarkError("the force that damages wood is not given", "", "give it with --wood-force; there is no default")
     forces = ForceRange(removal_force(bark_force, bond, area, friction), wood_force)
     law = RemovalLaw(clears, energy) if clears or energy else None
+    if speed is None:
+        raise DembarkError("the speed of the drum is not given", "", "give it with --speed, such as '11.5 rpm'")
     files = [file for source in sources for file in files_of(source)]
     _check_places(out, plot=plot, read=(*files, grains))
-    given = Given(grains, speed, begin, end, least_speed, stiffness, length_)
+    given = Given(speed, grains, begin, end, least_speed, stiffness or math.nan, length_ or math.nan)
     results = []
     with progress("debark", len(files)) as advance:
         for file in files:

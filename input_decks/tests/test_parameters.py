@@ -34,8 +34,9 @@ BASES: dict[str, dict[str, Any]] = {
     "oblique_impact": {},
     "penetration": {"grain_count": 100, "box_length": 0.02, "box_width": 0.02, "ball_diameter": 0.008},
 }
-# How many packings there are is the harness's, for a deck makes one; what counts as an impact is the measurement's.
-NOT_READ = {"replicas", "impact_speed"}
+# How many packings there are is the harness's, for a deck makes one; what counts as an impact, and what it does to bark and wood, is the
+# measurement's.
+NOT_READ = {"replicas", "impact_speed", "bark_force", "wood_force", "cleared_width"}
 # Where a deck uses a number, and where the numbers at its top end.
 USE = {"liggghts": (r"\$\{NAME\}", "\n\n"), "lammps": (r"\$\{NAME\}", "\n\n"), "yade": (r'\bp\.NAME\b|"NAME"', "\n)\n")}
 

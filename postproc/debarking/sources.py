@@ -23,21 +23,17 @@ _NAMES = ("impacts.txt", "impacts.bin")
 
 @dataclass(frozen=True)
 class Given:
-    """What the user says of a source, in SI units; None: what the record of the run says."""
+    """What the user says of a source, in SI units: angular velocity of the drum (rad/s), begin and end of the window (s; None: the end of
+    the run, or the last impact), approach from which a contact is an impact (m/s), stiffness of a log (N/m) and length of the logs (m; NaN:
+    unknown); `grains`, a dump of the logs, None: that next to the impacts."""
 
+    speed: float
     grains: Path | None = None
-    drum_speed: float | None = None
-    begin: float | None = None
+    begin: float = 0.0
     end: float | None = None
-    impact_speed: float | None = None
-    log_stiffness: float | None = None
-    log_length: float | None = None
-
-    def of(self, record: Mapping[str, Any], name: str, default: float) -> float:
-        """The number `name`: given, of the run's parameters, or `default`."""
-        given = getattr(self, name)
-        value = record.get("parameters", {}).get(name) if given is None else given
-        return default if value is None else float(value)
+    least_speed: float = 0.0
+    stiffness: float = math.nan
+    length: float = math.nan
 
 
 def files_of(path: Path) -> list[Path]:
@@ -53,18 +49,13 @@ def files_of(path: Path) -> list[Path]:
 def load_of(file: Path, given: Given) -> Load:
     """The load whose impacts are in `file`; DembarkError or DumpError in one line where something is missing."""
     record = read_json(file.parent / "run.json") or {}
-    speed = given.of(record, "drum_speed", math.nan)
-    if math.isnan(speed):
-        raise DembarkError(f"the speed of the drum of {file} is not known", "", "give it with --speed, such as '11.5 rpm'")
-    impacts, period = read_impacts(file), 2.0 * math.pi / abs(speed)
+    impacts, period = read_impacts(file), 2.0 * math.pi / given.speed
     if not len(impacts):
         raise DembarkError(f"{file} holds no impact")
-    begin = given.begin if given.begin is not None else float(record.get("parameters", {}).get("run_in", 0)) * period
-    end = given.end if given.end is not None else _last(impacts, record)
+    begin, end = given.begin, given.end if given.end is not None else _last(impacts, record)
     if end - begin < 0.25 * period:
         raise DembarkError(f"the window of {file} from {begin:g} to {end:g} s is less than a quarter of a revolution ({period:.3g} s)")
-    return Load(_counted(impacts, record), _logs(file, given, record), begin, end, period, given.of(record, "impact_speed", 0.0),
-                given.of(record, "log_stiffness", math.nan))
+    return Load(_counted(impacts, record), _logs(file, given), begin, end, period, given.least_speed, given.stiffness)
 
 
 def _last(impacts: Impacts, record: Mapping[str, Any]) -> float:
@@ -83,9 +74,9 @@ def _counted(impacts: Impacts, record: Mapping[str, Any]) -> Impacts:
     return moved
 
 
-def _logs(file: Path, given: Given, record: Mapping[str, Any]) -> Logs:
+def _logs(file: Path, given: Given) -> Logs:
     dump = given.grains or file.parent / "grains.dump"
     if not dump.is_file():
         raise DembarkError(f"there is no {dump}", "", "name a dump with id, radius and mass of the logs with --grains")
     frame = GrainsDump(dump, skip_truncated=True)[0]
-    return Logs(frame.ids, frame.radii, frame.masses, given.of(record, "log_length", math.nan))
+    return Logs(frame.ids, frame.radii, frame.masses, given.length)

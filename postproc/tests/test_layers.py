@@ -24,8 +24,8 @@ def own_parameters():
     return {name for table in [*(one.get("parameters", {}) for one in tables[:-1]), *groups] for name in table}
 
 
-# Names that a case shares with a field, a column of time.csv, or a key of every run.json.
-SHARED = {"solid_fraction", "grain_count", "liquid_content", "motion_angle", "time_step"}
+# Names that a case shares with a field, a column of time.csv, a function, or a key of every run.json.
+SHARED = {"bark_force", "solid_fraction", "grain_count", "liquid_content", "motion_angle", "time_step"}
 
 
 def test_postproc_knows_no_case():
