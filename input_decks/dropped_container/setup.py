@@ -6,8 +6,7 @@ import numpy as np
 
 from dembark.common.errors import DembarkError
 from dembark.input_decks.common import packing
-from dembark.input_decks.common.setup import Array, Parameters, Setup, rectangle, time_step
-from dembark.input_decks.conical_silo.setup import revolved
+from dembark.input_decks.common.setup import Array, Parameters, Setup, rectangle, revolved, time_step
 
 # Diameters between the sphere that lands and the floor of the vessel: no grain comes near.
 GAP = 2.0
