@@ -98,6 +98,14 @@ def log_density(surrogates: Sequence[Surrogate], outputs: Sequence[Output], plac
 
 def posterior(places: Array, outputs: Sequence[Output], allowed: Callable[[Array], bool] = everywhere, seed: int = 0) -> Posterior:
     """Samples of the quantiles of the parameters that reproduce the targets of `outputs`, from what was measured at `places`."""
+    from threadpoolctl import threadpool_limits
+
+    # Matrices of some hundred points: threads cost more than they save.
+    with threadpool_limits(1):
+        return _sampled(places, outputs, allowed, seed)
+
+
+def _sampled(places: Array, outputs: Sequence[Output], allowed: Callable[[Array], bool], seed: int) -> Posterior:
     import emcee
 
     surrogates = [Surrogate(places, one) for one in outputs]
