@@ -11,8 +11,6 @@ from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.units import NUMBER, finite, to_si
 
-from .debarking.laws import bark_force
-from .debarking.laws import bond as known_bond
 from .grains import GrainFrame
 from .walls import CylinderWall, Inclusion, MeshWall, Motion, PlaneWall, Wall
 from .walls.patches import Patches, borders, box_patches, count_of, cylinder_patches, inclusion_patches, mesh_patches, plane_patches
@@ -52,6 +50,9 @@ def positive(unit: str, option: str) -> Callable[[str], float]:
 
 def removal_force(force: float | None, bond: str | None, area: float | None, friction: float | None) -> float:
     """The peak force (N) that removes bark: given, or that of a `bond`, `species:condition` or a strength, on an `area` (m2)."""
+    from .debarking.laws import bark_force
+    from .debarking.laws import bond as known_bond
+
     if (force is None) == (bond is None):
         raise DembarkError("the force that removes bark is not given" if force is None else "--bark-force and --bond are given", "",
                            "give --bark-force, or --bond with --area and --friction; there is no default")

@@ -105,10 +105,11 @@ def scalars(one: Floor) -> dict[str, Estimate]:
         return float((f[here] * f[there]).mean() / (f[keep] ** 2).mean())
 
     every = np.ones(len(idle), bool)
+    alpha = of(power_exponent, every)
     return {
         "floor_beta": of(exponential_slope, every),
-        "floor_alpha": of(power_exponent, every),
-        "floor_uniformity": of(power_exponent, every),
+        "floor_alpha": alpha,
+        "floor_uniformity": alpha,
         "floor_beta_loaded": of(exponential_slope, ~idle),
         "floor_alpha_loaded": of(power_exponent, ~idle),
         "floor_beta_large": of(lambda f: exponential_slope(f, 2.0), every),

@@ -59,7 +59,7 @@ def test_contacts_are_on_the_sector_of_the_logs_own_frame(angle: float, turn_a: 
     normal = dict.fromkeys(("nx", "ny", "nz"), 0.0)
     across, up = (("ny", "nz"), ("nz", "nx"), ("nx", "ny"))[axis]
     normal |= {across: math.cos(angle), up: math.sin(angle)}
-    # A second impact tells the axis where the first one's normal lies in two planes; it is outside of the window.
+    # Where the first impact's normal lies in two planes, a second one outside of the window shows the axis.
     impacts = records(2, id_b=2, turn_a=turn_a, turn_b=turn_b, time=[1.0, 100.0], **normal)
     impacts["nx ny nz".split()[axis]] = 0.0
     impacts[across][1], impacts[up][1] = 0.6, 0.8

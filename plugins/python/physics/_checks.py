@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,6 +39,24 @@ def numbers(name: str, value: ArrayLike, unit: str, *, low: float = -np.inf, hig
         bound = f"> {low:g}" if low_open else f">= {low:g}" if high == np.inf else f"between {low:g} and {high:g}"
         raise ValueError(f"{name} must be {f'{bound} {unit}'.rstrip()}{'' if infinite else ' and finite'}, not {first:g}")
     return array
+
+
+def vectors(name: str, value: ArrayLike, unit: str, n: int, dimension: int) -> NDArray[np.float64]:
+    """A vector of `dimension` components for all, or one for each of `n`, as (n, 3); in the plane the third one is 0."""
+    array = numbers(name, value, unit)
+    if array.shape not in ((n, dimension), (dimension,)):
+        raise ValueError(f"{name} must have the shape ({n}, {dimension}), not {array.shape} ({unit})")
+    out = np.zeros((n, 3))
+    out[:, :dimension] = array
+    return out
+
+
+def one_each(name: str, value: ArrayLike, unit: str, n: int, thing: str, **limits: Unpack[Limits]) -> NDArray[np.float64]:
+    """A number for all of `n` things, or one for each, as (n,)."""
+    array = numbers(name, value, unit, **limits)
+    if array.shape not in ((), (n,)):
+        raise ValueError(f"{name} must be a number or have one value a {thing}, shape ({n},), not {array.shape} ({unit})")
+    return np.broadcast_to(array, (n,)).astype(float)
 
 
 def contact_number(name: str, value: ArrayLike, label: str = "") -> NDArray[np.float64]:

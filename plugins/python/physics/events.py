@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import Limits, numbers
+from dembark.physics._checks import Limits, numbers, one_each, vectors
 from dembark.physics.motion import WallMotion
 
 Floats = NDArray[np.float64]
@@ -68,24 +70,11 @@ class HardMotion:
         return self.kinetic_energy + self.potential_energy + self.normal_loss + self.friction_loss - self.wall_work.sum(axis=1)
 
 
-def _vectors(name: str, value: ArrayLike, unit: str, n: int, dimension: int) -> Floats:
-    array = numbers(name, value, unit)
-    if array.shape not in ((n, dimension), (dimension,)):
-        raise ValueError(f"{name} must have the shape ({n}, {dimension}), not {array.shape} ({unit})")
-    out = np.zeros((n, 3))
-    out[:, :dimension] = array
-    return out
+_each = partial(one_each, thing="grain")
 
 
-def _each(name: str, value: ArrayLike, unit: str, n: int, **limits: float | bool) -> Floats:
-    array = numbers(name, value, unit, **Limits(**limits))  # type: ignore[typeddict-item]
-    if array.shape not in ((), (n,)):
-        raise ValueError(f"{name} must be a number or have one value a grain, shape ({n},), not {array.shape} ({unit})")
-    return np.broadcast_to(array, (n,)).astype(float)
-
-
-def _number(name: str, value: float, unit: str = "", **limits: float | bool) -> float:
-    array = numbers(name, value, unit, **Limits(**limits))  # type: ignore[typeddict-item]
+def _number(name: str, value: float, unit: str = "", **limits: Unpack[Limits]) -> float:
+    array = numbers(name, value, unit, **limits)
     if array.shape != ():
         raise ValueError(f"{name} must be a number, not {value!r}")
     return float(array)
@@ -135,9 +124,9 @@ class HardGrains:
         grains = np.zeros((n, 11))
         grains[:, 0] = _each("mass", mass, "kg", n, low=0.0, low_open=True)
         grains[:, 1] = _each("radius", radius, "m", n, low=0.0, low_open=True)
-        grains[:, 2:5] = _vectors("position", x, "m", n, self._dimension)
+        grains[:, 2:5] = vectors("position", x, "m", n, self._dimension)
         if velocity is not None:
-            grains[:, 5:8] = _vectors("velocity", velocity, "m/s", n, self._dimension)
+            grains[:, 5:8] = vectors("velocity", velocity, "m/s", n, self._dimension)
         if spin is not None:
             grains[:, 8:11] = self._spins(spin, n)
         kind = inertia or ("sphere" if self._dimension == 3 else "cylinder")
@@ -149,7 +138,7 @@ class HardGrains:
         laws = [between, *(_law(*(own if given is None else given for own, given in zip(
             between, (wall.restitution, wall.friction, wall.tangential_restitution), strict=True))) for wall in walls)]
         rows = [[e, *speed, mu, beta] for e, mu, beta in laws]
-        g = [0.0, 0.0, 0.0] if gravity is None else _vectors("gravity", gravity, "m/s^2", 1, self._dimension)[0].tolist()
+        g = [0.0, 0.0, 0.0] if gravity is None else vectors("gravity", gravity, "m/s^2", 1, self._dimension)[0].tolist()
         self._walls = len(walls)
         self._solver = _physics.EventSolver(
             grains, self._dimension, _SHAPES[kind], rows[0], g, _number("contact_duration", contact_duration, "s", low=0.0),
@@ -158,7 +147,7 @@ class HardGrains:
 
     def _spins(self, spin: ArrayLike, n: int) -> Floats:
         if self._dimension == 3:
-            return _vectors("spin", spin, "rad/s", n, 3)
+            return vectors("spin", spin, "rad/s", n, 3)
         out = np.zeros((n, 3))
         out[:, 2] = _each("spin", spin, "rad/s", n)
         return out
@@ -166,10 +155,10 @@ class HardGrains:
     def _plane(self, wall: HardWall) -> list[float]:
         if not isinstance(wall, HardWall):
             raise TypeError(f"walls must be HardWall objects, not {wall!r}")
-        normal = _vectors("normal", wall.normal, "", 1, self._dimension)[0]
+        normal = vectors("normal", wall.normal, "", 1, self._dimension)[0]
         if not normal.any():
             raise ValueError("normal must not be zero")
-        return [*_vectors("point", wall.point, "m", 1, self._dimension)[0], *(normal / np.linalg.norm(normal))]
+        return [*vectors("point", wall.point, "m", 1, self._dimension)[0], *(normal / np.linalg.norm(normal))]
 
     def _ends(self, periods: Sequence[tuple[float, float] | None] | None) -> list[float]:
         ends = [0.0] * 6
@@ -221,7 +210,7 @@ class HardGrains:
         grains = np.asarray(self._solver.grains())
         n = len(grains)
         spins = grains[:, 8:] if spin is None else self._spins(spin, n)
-        self._solver.set_velocities(_vectors("velocity", velocity, "m/s", n, self._dimension), np.ascontiguousarray(spins))
+        self._solver.set_velocities(vectors("velocity", velocity, "m/s", n, self._dimension), np.ascontiguousarray(spins))
 
     def state(self) -> Floats:
         """Everything needed to go on bit for bit."""

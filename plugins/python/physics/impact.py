@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Unpack
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import Limits, numbers
+from dembark.physics._checks import numbers, one_each, vectors
 from dembark.physics.friction import FinnieRabinowicz
 
 Floats = NDArray[np.float64]
@@ -99,20 +99,7 @@ class Drum:
     friction: Friction = None
 
 
-def _vectors(name: str, value: ArrayLike, unit: str, n: int, dimension: int) -> Floats:
-    array = numbers(name, value, unit)
-    if array.shape not in ((n, dimension), (dimension,)):
-        raise ValueError(f"{name} must have the shape ({n}, {dimension}), not {array.shape} ({unit})")
-    out = np.zeros((n, 3))
-    out[:, :dimension] = array
-    return out
-
-
-def _each(name: str, value: ArrayLike, unit: str, n: int, **limits: Unpack[Limits]) -> Floats:
-    array = numbers(name, value, unit, **limits)
-    if array.shape not in ((), (n,)):
-        raise ValueError(f"{name} must be a number or have one value a body, shape ({n},), not {array.shape} ({unit})")
-    return np.broadcast_to(array, (n,)).astype(float)
+_each = partial(one_each, thing="body")
 
 
 def _materials(stiffness: ArrayLike, damping: ArrayLike, n: int) -> tuple[Floats, Floats]:
@@ -337,19 +324,19 @@ class ImpactSystem:
             bodies["inertia"] = (0.5 if inertia == "cylinder" else 0.4) * m * r**2
         else:
             bodies["inertia"] = _each("inertia", inertia, "kg m^2", n, low=0.0, low_open=True, infinite=True)
-        bodies["position"] = _vectors("position", x, "m", n, d)
+        bodies["position"] = vectors("position", x, "m", n, d)
         if velocity is not None:
-            bodies["velocity"] = _vectors("velocity", velocity, "m/s", n, d)
+            bodies["velocity"] = vectors("velocity", velocity, "m/s", n, d)
         if spin is not None:
             if d == 3:
-                bodies["spin"] = _vectors("spin", spin, "rad/s", n, 3)
+                bodies["spin"] = vectors("spin", spin, "rad/s", n, 3)
             else:
                 bodies["spin"][:, 2] = _each("spin", spin, "rad/s", n)
         if force is not None:
-            bodies["force"] = _vectors("force", force, "N", n, d)
+            bodies["force"] = vectors("force", force, "N", n, d)
         if gravity is not None:
             finite = np.where(np.isinf(m), 0.0, m)
-            bodies["force"] += finite[:, None] * _vectors("gravity", gravity, "m/s^2", n, d)
+            bodies["force"] += finite[:, None] * vectors("gravity", gravity, "m/s^2", n, d)
         if int(friction_sweeps) < 1:
             raise ValueError(f"friction_sweeps must be >= 1, not {friction_sweeps}")
 
