@@ -11,11 +11,13 @@
 #include "catch.hpp"
 #include "dembark/constants.hpp"
 #include "dembark/events/solver.hpp"
+#include "hard_grains.hpp"
 
 namespace {
 
 using namespace dembark;
 using namespace dembark::events;
+using hard_grains::refusal;
 
 Settings periodic(double length, double low = 0.0) {
   Settings s;
@@ -305,14 +307,6 @@ TEST_CASE("Rounding ends the collapse of a row, and contacts that have a duratio
 }
 
 TEST_CASE("Hard grains that cannot be are refused in one line", "[events]") {
-  const auto refusal = [](const Settings& s, const std::vector<Grain>& grains) {
-    try {
-      const Solver solver(s, grains);
-    } catch (const std::invalid_argument& error) {
-      return std::string(error.what());
-    }
-    return std::string("accepted");
-  };
   const Grain one = sphere(1, 0.5, {0, 0, 0});
   Settings s;
   CHECK(refusal(s, {one}) == "accepted");

@@ -11,11 +11,13 @@
 #include "catch.hpp"
 #include "dembark/constants.hpp"
 #include "dembark/events/solver.hpp"
+#include "hard_grains.hpp"
 
 namespace {
 
 using namespace dembark;
 using namespace dembark::events;
+using hard_grains::refusal;
 
 constexpr double g = 9.81;
 
@@ -260,14 +262,6 @@ TEST_CASE("A bed of grains on a shaken plate keeps its accounts and never overla
 }
 
 TEST_CASE("Walls of hard grains that cannot be are refused in one line", "[events]") {
-  const auto refusal = [](const Settings& s, const std::vector<Grain>& grains) {
-    try {
-      const Solver solver(s, grains);
-    } catch (const std::invalid_argument& error) {
-      return std::string(error.what());
-    }
-    return std::string("accepted");
-  };
   CHECK(refusal(above(floor_with("")), {ball(0.0)}) == "accepted");
   CHECK(refusal(above(floor_with("harmonic amplitude 0 0 2e-3 frequency 30")), {ball(1.0), ball(-1e-3)}) ==
         "grain 1 is 0.001 m inside wall 0 at the start");
