@@ -22,7 +22,7 @@ def over_chaotic(values: Iterable[float]) -> Estimate:
 
 def divided(found: Estimate, scale: float) -> Estimate:
     """`found` and its interval over `scale`."""
-    return Estimate(found.value / scale, found.half / scale, found.basis)
+    return Estimate(found.value / scale, found.half / abs(scale), found.basis)
 
 
 def ratio(one: Estimate, other: Estimate) -> Estimate:

@@ -18,6 +18,8 @@ from .drive import Drive, phases, read, sticking_block, transients
 STICKS = 0.3
 # Middle of the published range of the exponent, by the number of dimensions in which grains move.
 RISE = {2: 1.4, 3: 1.0}
+# Middle of the measured range of the exponent of the number of grains, with its sign turned.
+FALL = 0.5
 
 
 def measure(replicas: Replicas) -> Measurement:
@@ -73,8 +75,8 @@ def stiffness(points: Points, moduli: Array) -> list[Curve]:
 
 
 def study(name: str, points: Points, along: str) -> Measurement:
-    """How the gap between both powers grows with the step; what a bed that springs takes; how the rise and the kinetic energy of a
-    bed shaken hard grow with the speed of the plate, at one frequency."""
+    """How the gap between both powers grows with the step; what a bed that springs takes; how the rise of a bed shaken hard falls with
+    the number of its grains; how its rise and its kinetic energy grow with the speed of the plate, at one frequency."""
     points, place = ordered(points, along)
     if name == "step":
         gaps = PowerLawFit(place, np.array([abs(measured(point, "power_gap").value) for point in points]), np.zeros(len(points)))
@@ -83,6 +85,10 @@ def study(name: str, points: Points, along: str) -> Measurement:
                            [gaps.convergence("power_gap", "Gap between both powers", "time step over the Rayleigh time", 2.0)])
     if name == "stiffness":
         return Measurement({}, stiffness(points, place))
+    if name == "rise_count":
+        rise = PowerLawFit.of(points, "rise", place)
+        return Measurement({"rise_exponent_count": Value(divided(rise.exponent, -1.0), exact(FALL))},
+                           [rise.curve("rise", "Rise of the centre of mass", "N", "Δz / d", -FALL, f"∝ N^−{FALL:g}")])
     dimensions = int(points[0]["parameters"]["dimensions"])
     speeds = np.array([measured(point, "speed").value for point in points])
     rise, energy = (PowerLawFit.of(points, quantity, speeds) for quantity in ("rise", "kinetic_energy"))

@@ -166,6 +166,17 @@ def rise_study(dimensions: int, power: float) -> dict[str, Any]:
     return judged("drive_power", drive.study("rise", points, "amplitude"))
 
 
+def count_study(power: float) -> dict[str, Any]:
+    points = [point({"grain_count": count}, {"rise": count**power}, part=0.01) for count in (600, 1200, 960)]
+    return judged("drive_power", drive.study("rise_count", points, "grain_count"))
+
+
+def test_the_exponent_of_the_number_of_grains_has_an_interval() -> None:
+    found = count_study(-0.5)["rise_exponent_count"]
+    low, high = found["interval"]
+    assert found["value"] == pytest.approx(0.5) and low < 0.5 < high
+
+
 def test_the_curve_over_stiffness_has_that_of_the_block() -> None:
     points = [point(defaults("drive_power", youngs_modulus=modulus, motion_gamma=3.0), {"power": 0.7, "flight": 0.8}, 0.1)
               for modulus in (1.4e8, 1.4e7)]
@@ -217,3 +228,4 @@ def controls_drive_power(_folder: Path) -> Iterator[Control]:
     yield Control("a gap of first order", step_study(2.0), step_study(1.0))
     yield Control("a rise with the square of the speed", rise_study(2, 1.4), rise_study(2, 2.0))
     yield Control("a rise with the square of the speed", rise_study(3, 1.0), rise_study(3, 2.0))
+    yield Control("a rise that does not depend on the number of grains", count_study(-0.5), count_study(0.0))
