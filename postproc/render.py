@@ -199,7 +199,7 @@ class Sheet:
             length, text = _round_length(0.2 * shown * self.camera.pixel)
             left, low, end = 0.5 * _MARGINS[0], 0.3 * _MARGINS[1], length / self.camera.pixel / width
             figure.add_artist(mpl.lines.Line2D([left, left + end], [low, low], color=INK, linewidth=1.6, solid_capstyle="butt"))
-            figure.text(left + 0.5 * end, low + 0.12 * _MARGINS[1], text, ha="center", va="bottom", color=INK)
+            figure.text(left, low + 0.12 * _MARGINS[1], text, va="bottom", color=INK)
             if self.colours:
                 axes = figure.add_axes(((shown + 0.1 * (width - shown)) / width, 0.14, 0.11 * (width - shown) / width, 0.72))
                 self.colours.bar(axes)

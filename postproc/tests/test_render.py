@@ -123,6 +123,14 @@ def test_a_sheet_has_the_image_the_scale_the_time_and_a_length():
     assert bare.camera.size == bare.size and max(bare.size) <= 1200
 
 
+def test_the_length_is_read_where_its_bar_is_shorter_than_its_letters():
+    eye = View.named("front")
+    sheet = Sheet(eye, eye.extent(PLACES, RADII), None, (120, 900), letters=0.05)
+    picture = sheet.compose(np.full((900, 120, 3), 255, np.uint8), np.nan)
+    dark = np.nonzero((picture < 200).any(axis=(0, 2)))[0]
+    assert dark[0] >= 2
+
+
 @pytest.mark.parametrize(("most", "length", "text"), [
     (0.3, 0.2, "200 mm"), (1.0, 1.0, "1 m"), (0.0099, 0.005, "5 mm"), (7e-5, 5e-5, "50 µm")])
 def test_lengths_are_round(most, length, text):
