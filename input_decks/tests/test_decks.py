@@ -177,6 +177,14 @@ def test_a_template_that_is_run_as_it_is_says_what_to_do(case: str, engine: str,
     assert f"This is a template. Write the deck with: dembark deck {case} --engine {engine}" in one.said()
 
 
+@pytest.mark.parametrize("engine", find("single_contact").engines)
+def test_a_parameter_changed_on_the_command_line_is_refused(engine: str, decks: Any, tmp_path: Path) -> None:
+    """Other numbers of the deck were computed from it; some parameters stand in no command."""
+    one = decks("single_contact", engine, tmp_path, {})
+    assert one.start(restitution=0.3).wait(60) != 0
+    assert "finished" not in one.said() and "restitution" in one.said() + Path(tmp_path, one.engine.facts.deck).read_text()
+
+
 HELD = {"liggghts": "setforce NULL 0.0 NULL", "lammps": "setforce NULL 0.0 NULL", "yade": "dembark.block(ids[1]"}
 
 

@@ -30,7 +30,7 @@ CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid carried b
                 "own_inertia": "moments of inertia other than a sphere's",
                 "creeping_friction": "friction of boxes without a spring"}
 DECK_NOTE = ("Written by dembark; SI units. Numbers with a comment are parameters. Numbers without one, the packing and the meshes are "
-             "computed from them: do not change these by hand. To change a parameter, write the deck anew with 'dembark deck'.")
+             "computed from them: do not change these by hand. To change a parameter, write the deck anew with 'dembark deck --set'.")
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,10 @@ class InputScript(Engine):
         environment = _environment(tuple(map(str, folders)))
         # Tables are for the template; a variable holds one number.
         given = texts({name: number.value for name, number in numbers.items() if not isinstance(number.value, tuple)})
+        # Strings, not `index`: -var of a number that others were computed from would change it alone, or nothing at all. So both engines
+        # refuse it.
         width = max((len(name) for name in given), default=0)
-        lines = [f"variable {name:{width}} index {text}" + (f" # {numbers[name].meaning}" if numbers[name].meaning else "")
+        lines = [f"variable {name:{width}} string {text}" + (f" # {numbers[name].meaning}" if numbers[name].meaning else "")
                  for name, text in given.items()]
         body = environment.from_string(source).render({"engine": cls.facts.name} | {name: number.value for name, number in numbers.items()})
         # The opening comment of the source stays on top.

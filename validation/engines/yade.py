@@ -29,7 +29,7 @@ class Yade(Engine):
     @classmethod
     def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
         """See Engine. The numbers take the place of the line `p = dembark.parameters()`."""
-        lines = [f"# {DECK_NOTE}", "from types import SimpleNamespace", "", "p = SimpleNamespace("]
+        lines = [f"# {DECK_NOTE}", "p = dembark.parameters("]
         lines += [f"    {name}={number.value!r}," + (f"  # {number.meaning}" if number.meaning else "") for name, number in numbers.items()]
         before, marker, after = source.partition("p = dembark.parameters()\n")
         if not marker:

@@ -8,6 +8,7 @@ first.
 
 import os
 import pathlib
+import re
 import signal
 import sys
 import time
@@ -22,7 +23,7 @@ if "/dev/null" in words:
     sys.exit(0)
 if "-in" in words:
     with pathlib.Path(words[words.index("-in") + 1]).open(encoding="utf-8") as file:
-        values = {line.split()[1]: line.split(" index ")[1].split(" # ")[0].strip() for line in file if line.startswith("variable ")}
+        values = {line.split()[1]: re.split(" (?:string|index) ", line)[1].split(" # ")[0].strip() for line in file if line.startswith("variable ")}
     values |= {words[i + 1]: words[i + 2] for i, word in enumerate(words) if word == "-var"}
 else:
     with pathlib.Path(words[words.index("-x") + 1]).open(encoding="utf-8") as file:

@@ -79,7 +79,7 @@ print "dembark: finished"
 """
 
 YADE = """
-from types import SimpleNamespace
+from yade import dembark
 p = dembark.parameters()
 steps, frames = p.steps, p.frames
 ids = [O.bodies.append(sphere((x, 0, 0), 0.05)) for x in (0, 0.5)]

@@ -1,5 +1,8 @@
 """Scenes of decks: bodies of packing.data, materials, walls, and the engines around the Finnie-Rabinowicz law."""
 
+import sys
+from types import SimpleNamespace
+
 from yade import (
     Bo1_Box_Aabb,
     Bo1_Facet_Aabb,
@@ -27,9 +30,15 @@ from yade.minieigenHP import Vector3
 O = Omega()
 
 
-def parameters():
-    """In a deck of dembark this line stands for the numbers of a run, which 'dembark deck' puts in its place."""
-    fail("this deck has no numbers; write it with 'dembark deck CASE --engine yade --out FOLDER'")
+def parameters(**numbers):
+    """The numbers of a run by name; 'dembark deck' writes them into the deck. A word behind the script that would change one is refused:
+    others were computed from it."""
+    if not numbers:
+        fail("this deck has no numbers; write it with 'dembark deck CASE --engine yade --out FOLDER'")
+    for word in sys.argv[1:]:
+        if word.partition("=")[0] in numbers:
+            fail(f"argument '{word}': other numbers of this deck were computed from it; write the deck anew with 'dembark deck --set'")
+    return SimpleNamespace(**numbers)
 
 
 def packing(path="packing.data"):
