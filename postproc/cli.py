@@ -333,7 +333,8 @@ def _drawn(wall: Wall | Inclusion) -> Wall:
 
 def _check_places(out: Path | None, *collections: Path | None, plot: Path | None = None, read: Iterable[Path | None]) -> None:
     """DembarkError when an output cannot be where it shall be, or two are the same file, or one is a file that is `read`."""
-    sources = [file for path in read if path for file in (path, *path.glob("*.dump"), *path.parent.glob(path.name)) if file.is_file()]
+    sources = [file for path in read if path
+               for file in (path, *(path.glob("*.dump") if path.is_dir() else path.parent.glob(path.name))) if file.is_file()]
     given = [path for path in (out, *collections) if path is not None]
     for path in given:
         if path.is_dir():

@@ -196,8 +196,11 @@ _FORMATS = (".csv", ".json", ".parquet")
 
 def export(folder: Path | str, table: str, target: Path | None = None) -> str:
     """The `table` (quantities, comparisons, runs) of a results folder as CSV text; or into the file `target`, whose name ends in .csv,
-    .json or .parquet. DembarkError for another name, and where Parquet files need a package that is not installed."""
+    .json or .parquet. DembarkError for another name, a folder without results, and where Parquet files need a package that is not
+    installed."""
     found = TABLES[pick(table, TABLES, "table", "in --table")](folder)
+    if found.empty and TABLES["quantities"](folder).empty:
+        raise DembarkError(f"no results in {folder}", "", "give the folder of a profile, a campaign or a run")
     if target is None:
         return found.to_csv(index=False)
     suffix = target.suffix.lower()

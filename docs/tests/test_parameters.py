@@ -10,6 +10,7 @@ import pytest
 from blocks import ROOT
 
 from dembark import _physics
+from dembark.postproc.impacts import COLUMNS
 
 NUMBERS = _physics.contact_parameters()
 CHOICES = _physics.contact_choices()
@@ -17,6 +18,13 @@ PAGE = (ROOT / "docs/reference/parameters.md").read_text(encoding="utf-8")
 ROWS = [[cell.strip() for cell in line.strip("|").split("|")]
         for section in re.findall(r"^## (?:Contact|Options|Liquid)\n(.*?)(?=^## )", PAGE, re.MULTILINE | re.DOTALL)
         for line in section.splitlines() if line.startswith("| ")]
+
+
+def test_columns_of_impacts_stand_in_the_order_of_the_file() -> None:
+    """A reader of the binary form has no other list."""
+    table = PAGE.partition("### File of impacts")[2].partition("\n\nThe angle")[0]
+    rows = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
+    assert tuple(re.findall(r"`(\w+)`", " ".join(rows))) == COLUMNS
 
 
 def row_of(entry: dict[str, Any]) -> list[str]:

@@ -34,7 +34,7 @@ def setup(p: Parameters) -> Setup:
     sites = sites[np.hypot(sites[:, 0], sites[:, 2]) <= radius - 0.52 * p.log_diameter_max]
     if len(sites) < n:
         raise DembarkError(f"filling {p.filling:g} is too high", f"the drum has places for {len(sites)} of {n} logs only",
-                           "take less or thinner logs")
+                           "take a lower filling" if p.drum_radius is None else "take fewer or thinner logs")
     diameters = p.log_diameter_min + span * (packing.rank(n, p.seed) + 0.5) / n
     box = [(-1.1 * radius, 1.1 * radius), (-0.5 * spacing, 0.5 * spacing), (-1.1 * radius, 1.1 * radius)]
     masses = line_density * diameters**2

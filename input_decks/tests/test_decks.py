@@ -182,7 +182,7 @@ def test_a_parameter_changed_on_the_command_line_is_refused(engine: str, decks: 
     """Other numbers of the deck were computed from it; some parameters stand in no command."""
     one = decks("single_contact", engine, tmp_path, {})
     assert one.start(restitution=0.3).wait(60) != 0
-    assert "finished" not in one.said() and "restitution" in one.said() + Path(tmp_path, one.engine.facts.deck).read_text()
+    assert "finished" not in one.said() and ("restitution" in one.said() or "different style" in one.said()), one.said()
 
 
 HELD = {"liggghts": "setforce NULL 0.0 NULL", "lammps": "setforce NULL 0.0 NULL", "yade": "dembark.block(ids[1]"}

@@ -56,7 +56,7 @@ def lines(results: Sequence[Outcome]) -> list[str]:
         p99 = over_replicas([Estimate(float(np.percentile(one, 99.0)), math.inf) for one in peaks if len(one)])
         half = f" ± {p99.half:.2g}" if math.isfinite(p99.half) else ""
         shape = np.median(np.concatenate([one.doses.shape for one in results]))
-        found += [f"peak force of impacts: 1 % exceed {p99.value:.4g}{half} N, the largest is {every.max():.4g} N",
+        found += [f"peak force of impacts: 99 % are at most {p99.value:.4g}{half} N, the largest is {every.max():.4g} N",
                   f"peak force over that of a half sine of the same impulse and duration: median {shape:.3f}"]
     if len(results) < 3:
         found.append("intervals are from quarter revolutions; three or more loads give those over loads")

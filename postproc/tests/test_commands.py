@@ -225,6 +225,7 @@ MISTAKES = [
     (["fields", "run"], "--out"),
     (["fields", "run", "--out", "no/f.nc"], "no folder no"),
     (["fields", "run", "--out", "run"], "is a folder"),
+    (["fields", ".", "--out", "f.nc"], "grains.dump"), (["walls", "."], "grains.dump"), (["render", ".", "--out", "x.png"], "grains.dump"),
     (["fields", "run", "--out", "run/grains.dump"], "grains.dump is a file that is read"),
     (["fields", "run/grains.dump", "--contacts", "run/contacts.dump", "--paraview", "run/contacts.dump"], "is a file that is read"),
     (["fields", "run", "--out", "f.nc", "--paraview", "f.nc"], "named twice"),

@@ -164,6 +164,8 @@ def wall_lines(one: WallStress, source: Source) -> list[str]:
     if one.contact_force.number:
         lines.append(f"  contacts: {one.contact_force.number / len(one.steps):.4g} a frame, mean normal force {one.contact_force.mean:.4g} "
                      f"N, largest {one.contact_force.largest:.4g} N")
+        if one.contact_force.mean < 0.0:
+            lines.append("  note: the grains pull at this wall; does its normal point to them?")
     if one.series is None:
         lines.append("  note: too many patches and frames to keep each frame's stresses; means and peaks are of all frames")
     low, high = one.reach

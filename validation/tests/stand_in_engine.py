@@ -23,7 +23,8 @@ if "/dev/null" in words:
     sys.exit(0)
 if "-in" in words:
     with pathlib.Path(words[words.index("-in") + 1]).open(encoding="utf-8") as file:
-        values = {line.split()[1]: re.split(" (?:string|index) ", line)[1].split(" # ")[0].strip() for line in file if line.startswith("variable ")}
+        given = (re.split(" (?:string|index) ", line) for line in file if line.startswith("variable "))
+        values = {name.split()[1]: text.split(" # ")[0].strip() for name, text in given}
     values |= {words[i + 1]: words[i + 2] for i, word in enumerate(words) if word == "-var"}
 else:
     with pathlib.Path(words[words.index("-x") + 1]).open(encoding="utf-8") as file:

@@ -26,6 +26,8 @@ def numbers(name: str, value: ArrayLike, unit: str, *, low: float = -np.inf, hig
             infinite: bool = False) -> NDArray[np.float64]:
     """`value` as float64, or ValueError naming the argument, its unit and what would be right."""
     try:
+        if np.asarray(value).dtype.kind in "bSU":  # of which float64 would make numbers
+            raise TypeError
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise TypeError(f"{name} must be a number or an array of numbers ({unit}), not {value!r}") from None

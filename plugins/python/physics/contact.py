@@ -6,6 +6,7 @@ half step before; so the same contact gives the same numbers in all three to rou
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -20,6 +21,8 @@ from dembark.physics.viscous import check_viscous
 
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
+# As the monitor of integration in the engines.
+LEAST_STEPS = 10
 
 
 def _vector(name: str, value: Sequence[float], unit: str) -> NDArray[np.float64]:
@@ -68,6 +71,8 @@ class RollingResistance:
     def __post_init__(self) -> None:
         contact_number("rolling_friction", self.friction, "friction")
         contact_number("rolling_damping_ratio", self.damping_ratio, "damping_ratio")
+        if self.model == "off" and (self.friction or self.damping_ratio):
+            raise ValueError("the rolling resistance is off; its model can be 'constant_torque' or 'elastic_plastic'")
         object.__setattr__(self, "_law", _physics.RollingResistance(self.model, float(self.friction), float(self.damping_ratio)))
 
 
@@ -117,18 +122,26 @@ class Contact:
             raise ValueError(f"cohesion {self.cohesion!r} is unknown; it can be {', '.join(_physics.cohesion_laws())}")
         if self.cohesion == "jkr" and self.normal_law != "hertz":
             raise ValueError("the cohesion 'jkr' needs the normal law 'hertz'")
-        if self.bridge_volume > 0.0 and self.cohesion not in ("", "bridge"):
-            raise ValueError(f"bridge_volume is for the cohesion 'bridge', not for {self.cohesion!r}")
+        cohesion = self._cohesion
+        for name, laws in (("bridge_volume", ("bridge",)), ("cohesive_force", ("constant",)), ("work_of_adhesion", ("dmt", "jkr")),
+                           ("viscosity", ("bridge",))):
+            if getattr(self, name) and cohesion not in laws:
+                raise ValueError(f"{name} is for the cohesion {' or '.join(map(repr, laws))}, not for {cohesion!r}")
+            if cohesion in laws and name != "viscosity" and not getattr(self, name):
+                raise ValueError(f"the cohesion {cohesion!r} needs a {name} > 0")
         check_model(self.capillary_model)
         check_viscous(self.viscosity, self.minimum_gap)
+
+    @property
+    def _cohesion(self) -> str:
+        return self.cohesion or ("bridge" if self.bridge_volume > 0.0 else "none")
 
     def begin(self) -> _physics.Contact:
         """State of a contact that has not touched yet."""
         return _physics.Contact(self.normal_law, self.effective_youngs_modulus, self.effective_shear_modulus, self.restitution,
                                 self.characteristic_velocity, self.tangential_damping, self.limit_force, self.friction._law,
-                                self.rolling._law, self.cohesion or ("bridge" if self.bridge_volume > 0.0 else "none"),
-                                self.cohesive_force, self.work_of_adhesion, self.capillary_model, self.contact_angle,
-                                self.surface_tension, self.bridge_volume, self.viscosity, self.minimum_gap)
+                                self.rolling._law, self._cohesion, self.cohesive_force, self.work_of_adhesion, self.capillary_model,
+                                self.contact_angle, self.surface_tension, self.bridge_volume, self.viscosity, self.minimum_gap)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,28 +188,36 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
     mass = np.array([b.mass for b in bodies])
     inertia = 0.4 * mass * np.array([b.radius for b in bodies]) ** 2
     g = _vector("gravity", gravity, "m/s^2")
-    if wall is None:
-        gap = float(np.linalg.norm(x[0] - x[1])) - bodies[0].radius - bodies[1].radius
-    else:
-        point, normal = _vector("wall_point", wall[0], "m"), _vector("wall_normal", wall[1], "1")
-        if abs(np.linalg.norm(normal) - 1.0) > 1e-9:
-            raise ValueError(f"wall_normal must be of length 1, not {np.linalg.norm(normal):g}")
-        gap = np.dot(x[0] - point, normal) - bodies[0].radius
+    point, normal = (_vector("wall_point", wall[0], "m"), _vector("wall_normal", wall[1], "1")) if wall else (x[-1], None)
+
+    def separation() -> NDArray[np.float64]:
+        return x[0] - x[1] if normal is None else np.dot(x[0] - point, normal) * normal
+
+    if normal is not None and abs(np.linalg.norm(normal) - 1.0) > 1e-9:
+        raise ValueError(f"wall_normal must be of length 1, not {np.linalg.norm(normal):g}")
+    least = min(body.radius for body in bodies)
+    volume = 4.0 / 3.0 * np.pi * least**3
+    gap = (np.linalg.norm(separation()) if normal is None else np.dot(x[0] - point, normal)) - sum(body.radius for body in bodies)
     if gap < 0.0:
         raise ValueError(f"bodies must not touch at the start, but overlap by {-gap:g} m")
+    if contact.bridge_volume > volume:
+        raise ValueError(f"bridge_volume must be at most that of the smallest sphere ({volume:.3g} m^3), not {contact.bridge_volume:g}")
     state = contact.begin()
     times = time_step * np.arange(1, steps + 1, dtype=np.float64)
     out = Trajectory(times, np.empty((steps, n, 3)), np.empty((steps, n, 3)), np.empty((steps, n, 3)), [])
+    apart = separation()
     # The first half step: no contact yet, gravity only, as the engines' set-up finds it.
     v += 0.5 * time_step * g
     for k in range(steps):
         x += time_step * v
-        if wall is None:
-            separation, v2, w2, r2, m2 = x[0] - x[1], _triple(v[1]), _triple(w[1]), bodies[1].radius, bodies[1].mass
-        else:
-            separation, v2, w2, r2, m2 = np.dot(x[0] - point, normal) * normal, ZERO, ZERO, np.inf, np.inf
-        step = ContactForce(*state.step(_triple(separation), _triple(v[0]), v2, _triple(w[0]), w2, bodies[0].radius, r2, bodies[0].mass, m2,
-                                        time_step, True))
+        before, apart = apart, separation()
+        # A wall has no velocity, and its mass is infinite.
+        other = (_triple(v[1]), _triple(w[1]), bodies[1].radius, bodies[1].mass) if wall is None else (ZERO, ZERO, np.inf, np.inf)
+        step = ContactForce(*state.step(_triple(apart), _triple(v[0]), other[0], _triple(w[0]), other[1], bodies[0].radius, other[2],
+                                        bodies[0].mass, other[3], time_step, True))
+        if step.overlap > least or np.dot(apart, before) < 0.0:
+            raise ValueError(f"the bodies pass through each other in step {k + 1}; take a shorter time_step, a larger "
+                             "effective_youngs_modulus or a lower speed")
         acceleration = np.tile(g, (n, 1))
         force = np.asarray(step.force)
         acceleration[0] += force / mass[0]
@@ -212,13 +233,24 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
         out.contacts.append(step)
         v += 0.5 * time_step * acceleration
         w += 0.5 * time_step * spin_up
+    _warn_of_few_steps(np.array([step.overlap > 0.0 for step in out.contacts]), time_step)
     return out
+
+
+def _warn_of_few_steps(touching: NDArray[np.bool_], time_step: float) -> None:
+    """A warning about the shortest contact that has ended, when it lasted fewer than LEAST_STEPS steps."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], touching]).astype(int)))
+    lasted = [int(end - start) for start, end in zip(edges[::2], edges[1::2], strict=False)]
+    if lasted and min(lasted) < LEAST_STEPS:
+        warnings.warn(f"a contact lasted {min(lasted)} steps of {time_step:g} s only, fewer than {LEAST_STEPS}; take a shorter time_step",
+                      RuntimeWarning, stacklevel=4)
 
 
 def collide(contact: Contact, body_1: Body, body_2: Body, *, time_step: float, steps: int, gravity: Sequence[float] = ZERO) -> Trajectory:
     """Free motion of two spheres through a contact; they must not touch at the start. `time_step` in s, `gravity` in m/s^2.
 
-    Raises ValueError or TypeError for arguments out of range.
+    Raises ValueError or TypeError for arguments out of range, and ValueError for bodies that pass through each other. A
+    RuntimeWarning says that a contact lasted fewer than ten steps, so that its restitution is not the given one.
     """
     return _integrate(contact, [body_1, body_2], None, gravity, time_step, steps)
 

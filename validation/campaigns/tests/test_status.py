@@ -110,11 +110,14 @@ def test_export(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert main(["export", str(results), "--table", "runs", "--out", str(tmp_path / "runs.json")]) == 0
     assert [row["state"] for row in json.loads((tmp_path / "runs.json").read_text())] == ["finished", "stopped", "waiting", "waiting"]
     capsys.readouterr()
+    empty = tmp_path / "empty"
+    empty.mkdir()
     for words, expected in (((str(results), "--out", "x.xls"), ".csv, .json, .parquet"), ((str(results), "--table", "run"), "runs"),
-                            (("nowhere",), "nowhere")):
+                            (("nowhere",), "nowhere"), ((str(empty), "--out", str(tmp_path / "x.csv")), "no results in")):
         assert main(["export", *words]) == 2
         error = capsys.readouterr().err
         assert expected in error and error.count("\n") == 1
+    assert not (tmp_path / "x.csv").exists()
 
 
 @pytest.mark.skipif(not os.access("/", os.W_OK), reason="needs a folder below the root")

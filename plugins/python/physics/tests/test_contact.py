@@ -1,5 +1,6 @@
 """Two bodies and one contact: conservation laws and exact results."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from dembark.physics import (
     Body,
     Contact,
     FinnieRabinowicz,
+    RollingResistance,
     collide,
     drop,
     effective_shear_modulus,
@@ -128,10 +130,54 @@ def test_bridge_holds_a_grain_and_needs_energy_to_part():
     ({"bridge_volume": -1e-12}, "bridge_volume"), ({"bridge_volume": 1e-12, "surface_tension": -1.0}, "surface_tension"),
     ({"bridge_volume": 1e-12, "contact_angle": 2.0}, "contact.angle"), ({"bridge_volume": 1e-12, "capillary_model": "magic"}, "magic"),
     ({"normal_law": "hooke", "characteristic_velocity": 0.0}, "characteristic_velocity"),
+    # What no law would use.
+    ({"work_of_adhesion": 0.1}, "work_of_adhesion is for the cohesion 'dmt' or 'jkr', not for 'none'"),
+    ({"cohesive_force": 1e-2, "cohesion": "jkr", "work_of_adhesion": 0.1}, "cohesive_force is for the cohesion 'constant', not for 'jkr'"),
+    ({"bridge_volume": 1e-12, "cohesion": "none"}, "bridge_volume is for the cohesion 'bridge'"),
+    ({"viscosity": 1e-3, "minimum_gap": 1e-6}, "viscosity is for the cohesion 'bridge'"),
+    ({"cohesion": "jkr"}, "'jkr' needs a work_of_adhesion > 0"), ({"cohesion": "constant"}, "'constant' needs a cohesive_force > 0"),
+    ({"cohesion": "bridge"}, "'bridge' needs a bridge_volume > 0"),
 ])
 def test_bad_contacts(change, words):
     with pytest.raises(ValueError, match=words):
         replace(CONTACT, **change).begin()
+
+
+@pytest.mark.parametrize("arguments", [(-5e6, 0.3, 5e6, 0.3), (5e6, 0.6, 5e6, 0.3), (5e6, 0.3, 0.0, 0.3), (5e6, 0.3, 5e6, -1.0),
+                                       (np.nan, 0.3, 5e6, 0.3)])
+def test_bad_materials(arguments):
+    for function in (effective_youngs_modulus, effective_shear_modulus):
+        with pytest.raises(ValueError, match=r"(youngs|poisson)_[12]"):
+            function(*arguments)
+
+
+def test_a_rolling_resistance_that_is_off_has_no_numbers():
+    with pytest.raises(ValueError, match="the rolling resistance is off"):
+        RollingResistance(friction=0.1)
+
+
+@pytest.mark.parametrize("value", ["0.5", True])
+def test_texts_and_truths_are_no_numbers(value):
+    with pytest.raises(TypeError, match="static_friction must be a number"):
+        replace(ROUGH, static_friction=value)
+
+
+def test_few_steps_of_a_contact_are_said():
+    ball = Body(radius=RADIUS, mass=MASS, position=(0.0, 0.0, 5.01e-3), velocity=(0.0, 0.0, -0.5))
+    with pytest.warns(RuntimeWarning, match=r"a contact lasted \d steps of 0.0002 s only, fewer than 10"):
+        drop(CONTACT, ball, time_step=2e-4, steps=40)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        drop(CONTACT, ball, time_step=2e-5, steps=400)
+
+
+def test_what_passes_through_is_refused():
+    with pytest.raises(ValueError, match="the bodies pass through each other in step 1"):
+        drop(CONTACT, replace(ONE, velocity=(0.0, 0.0, -500.0)), time_step=1e-3, steps=5)
+    with pytest.raises(ValueError, match="the bodies pass through each other"):
+        collide(CONTACT, replace(ONE, velocity=(0.0, 0.0, -500.0)), TWO, time_step=1e-6, steps=50)
+    with pytest.raises(ValueError, match="bridge_volume must be at most that of the smallest sphere"):
+        drop(replace(CONTACT, bridge_volume=80.0, surface_tension=0.072), ONE, time_step=1e-6, steps=5)
 
 
 @pytest.mark.parametrize(("change", "words"), [
