@@ -158,6 +158,13 @@ def test_a_wall_in_the_wrong_place_raises_a_doubt(run, capsys):
     assert "is it where the simulation had it?" in capsys.readouterr().out
 
 
+def test_a_wall_that_faces_away_raises_a_doubt(run, capsys):
+    assert main(["walls", "run", "--wall", "base:plane:normal=0,0,-1", "--out", "w.nc"]) == 0
+    assert "note: the grains pull at this wall; does its normal point to them?" in capsys.readouterr().out
+    assert main(["walls", "run", "--wall", "base:plane", "--out", "w.nc"]) == 0
+    assert "does its normal point" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("unit", ["m", "um"])
 def test_an_stl_in_another_unit_is_refused_with_those_that_fit(run, capsys, unit):
     """Both commands, before any file is made: the loads of a mesh a thousand times too large would be nonsense."""
