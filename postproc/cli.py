@@ -1,29 +1,35 @@
-"""The commands `dembark fields`, `dembark walls`, `dembark debark` and `dembark render`."""
+"""The commands `dembark fields`, `dembark walls`, `dembark debark`, `dembark render` and `dembark tracks`."""
 
 from __future__ import annotations
 
 import math
 import signal
-import sys
-import time as clock
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
-from datetime import UTC, datetime
-from importlib.metadata import version
+from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from dembark.common.errors import DembarkError, Interrupted
 from dembark.common.extras import missing_extra
 from dembark.common.files import write_atomic
 from dembark.common.units import to_si
 
-from .cli_options import contact_columns, frame_numbers, length, parse_wall, picture_size, positive, removal_force, value_range
+from .cli_options import (
+    contact_columns,
+    frame_numbers,
+    grain_numbers,
+    lags,
+    length,
+    parse_wall,
+    picture_size,
+    positive,
+    removal_force,
+    value_range,
+)
+from .cli_output import check_places, progress, provenance, say
 from .contacts import ContactColumnsError
 from .dumps.frames import ColumnsError, DensityError, DumpError, DumpWarning
 from .grains import GrainFrame
@@ -116,14 +122,14 @@ def fields(
 
     if not any((out, paraview, grains, plot)):
         raise DembarkError("there is nothing to write", "", "name a file with --out or --paraview, or a folder with --plot")
-    _check_places(out, paraview, grains, plot=plot, read=(source, contacts))
+    check_places(out, paraview, grains, plot=plot, read=(source, contacts))
     opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
                          contact_columns=contact_columns, units=units)
     chosen = select(opened, frame_numbers(frames, len(opened.grains)))
     averages = FieldAverages(
         chosen, kernel=kernel, width=width, grid=grid, spacing=spacing, box=box, average=average, walls=wall or (), cells=cells,
         least_contacts=least_contacts, only=only, threads=threads, show=progress)
-    about = _provenance("fields", source)
+    about = provenance("fields", source)
     opening = TimeSeries(grains, about, spheres=True) if grains else nullcontext()
     with progress("fields", len(chosen.numbers)) as advance, opening as points:
         def done(frame: GrainFrame, time: float) -> None:
@@ -144,7 +150,7 @@ def fields(
         assert averages.last
         of_walls = {name: figure for load in averages.loads for name, figure in wall_figures(load).items()}
         written += save(plot, field_figures(averages.last) | of_walls)
-    _say([*averages.summary(), *(f"written: {path}" for path in written)])
+    say([*averages.summary(), *(f"written: {path}" for path in written)])
 
 
 @app.command()
@@ -165,7 +171,7 @@ def walls(
     units: Units = "",
 ) -> None:
     """Normal and shear stress on walls and inclusions: distribution, time series, fluctuations, peaks."""
-    _check_places(out, paraview, plot=plot, read=(source, contacts))
+    check_places(out, paraview, plot=plot, read=(source, contacts))
     opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
                          contact_columns=contact_columns, units=units)
     chosen = select(opened, frame_numbers(frames, len(opened.grains)))
@@ -181,7 +187,7 @@ def walls(
             loads.add(grains, touching, opened.time(grains))
             diameters += mean_diameter(grains)
             advance()
-    results, about = loads.results(), _provenance("walls", source)
+    results, about = loads.results(), provenance("walls", source)
     if out:
         import xarray
 
@@ -197,7 +203,7 @@ def walls(
         from .plots import save, wall_figures
 
         written += save(plot, {name: figure for one in results for name, figure in wall_figures(one).items()})
-    _say([*chosen.lines(diameters), *loads.mesh_notes(), *(f"note: {one}; add --wall" for one in loads.notes),
+    say([*chosen.lines(diameters), *loads.mesh_notes(), *(f"note: {one}; add --wall" for one in loads.notes),
           *(line for one in results for line in wall_lines(one, opened)), *(f"written: {path}" for path in written)])
 
 
@@ -244,7 +250,7 @@ def debark(
     if speed is None:
         raise DembarkError("the speed of the drum is not given", "", "give it with --speed, such as '11.5 rpm'")
     files = [file for source in sources for file in files_of(source)]
-    _check_places(out, plot=plot, read=(*files, grains))
+    check_places(out, plot=plot, read=(*files, grains))
     given = Given(speed, grains, begin, end, least_speed, stiffness or math.nan, length_ or math.nan)
     results = []
     with progress("debark", len(files)) as advance:
@@ -255,12 +261,12 @@ def debark(
     if out:
         from .output.netcdf import write_netcdf
 
-        written.append(write_netcdf(out, dataset(results, **_provenance("debark", sources[0]))))
+        written.append(write_netcdf(out, dataset(results, **provenance("debark", sources[0]))))
     if plot:
         from .plots import save
 
         written += save(plot, figures(results))
-    _say([*lines(results), *(f"written: {path}" for path in written)])
+    say([*lines(results), *(f"written: {path}" for path in written)])
 
 
 @app.command()
@@ -303,7 +309,7 @@ def render(
     place = out or Path(f"{source.resolve().name.split('.')[0]}{suffixes[0]}")
     if place.suffix not in suffixes:
         raise DembarkError(f"{place.name} does not end in {', '.join(suffixes)}", "in --out", "take one of these")
-    _check_places(place, read=(source, contacts))
+    check_places(place, read=(source, contacts))
     drawing.View.named(view or "iso")
     look = Look(colour_by, unit, value_range(span) if span else None, colours=colours, view=view, cut=cut, surface=surface, walls=not bare,
                 size=picture_size(size) if size else None)
@@ -322,7 +328,7 @@ def render(
                 file = place if len(numbers) == 1 else place.with_stem(f"{place.stem}-{mark}")
                 written.append(write_atomic(file, drawing.still(image, file.suffix)))
                 advance()
-    _say([*chosen.lines([]), *(f"note: {one}" for one in album.notes), *(f"written: {path}" for path in written)])
+    say([*chosen.lines([]), *(f"note: {one}" for one in album.notes), *(f"written: {path}" for path in written)])
 
 
 def _drawn(wall: Wall | Inclusion) -> Wall:
@@ -331,56 +337,59 @@ def _drawn(wall: Wall | Inclusion) -> Wall:
     return wall
 
 
-def _check_places(out: Path | None, *collections: Path | None, plot: Path | None = None, read: Iterable[Path | None]) -> None:
-    """DembarkError when an output cannot be where it shall be, or two are the same file, or one is a file that is `read`."""
-    sources = [file for path in read if path
-               for file in (path, *(path.glob("*.dump") if path.is_dir() else path.parent.glob(path.name))) if file.is_file()]
-    given = [path for path in (out, *collections) if path is not None]
-    for path in given:
-        if path.is_dir():
-            raise DembarkError(f"{path} is a folder", "", "name a file")
-        if not path.parent.is_dir():
-            raise DembarkError(f"there is no folder {path.parent}", f"for {path.name}", "make it first")
-        if path.is_file() and any(path.samefile(one) for one in sources):
-            raise DembarkError(f"{path} is a file that is read", "", "name another place")
-        if given.count(path) > 1:
-            raise DembarkError(f"{path} is named twice", "", "give each output a file of its own")
-    if any(collections):
-        from .output.paraview import check_place
+@app.command()
+def tracks(
+    source: Annotated[Path, typer.Argument(metavar="DUMP|RUN|TRACKS.csv", help="A dump, a run's folder, or a file of measured tracks.")],
+    grains: Annotated[str | None, typer.Option(metavar="IDS", help=(
+        "Grains by their numbers: 1,5-9; default: those of the first frame."))] = None,
+    frames: Frames = ":",
+    against: Annotated[Path | None, typer.Option(metavar="TRACKS.csv", help=(
+        "Measured tracks to compare with, along the axes of both."))] = None,
+    interval: Annotated[float | None, typer.Option(parser=positive("s", "--interval"), metavar="TEXT", help=(
+        "Time between two positions that give a velocity: '8 ms'; default: one frame, or that of --against."))] = None,
+    diffusion: Annotated[str | None, typer.Option(metavar="TIME,TIME", help=(
+        "Lags between which the mean square displacement shows the diffusion; default: 0.1 and 0.4 of the time."))] = None,
+    out: Annotated[Path | None, typer.Option(help="File of the tracks: .csv, or .nc with what is measured, for xarray.")] = None,
+    plot: Plot = None,
+    contacts: Contacts = None,
+    time_step: TimeStep = None,
+    density: Density = None,
+    columns: Columns = None,
+    contact_columns: ContactColumns = None,
+    units: Units = "",
+) -> None:
+    """Tracks of single grains, and their velocities, mean square displacements and self-diffusion."""
+    from . import tracks as tracking
+    from .track_report import dataset, figures, lines
 
-        for path in filter(None, collections):
-            check_place(path)
-    if plot is not None and plot.exists() and not plot.is_dir():
-        raise DembarkError(f"{plot} is a file", "in --plot", "name a folder")
+    if out and out.suffix not in (".csv", ".nc"):
+        raise DembarkError(f"{out.name} does not end in .csv or .nc", "in --out", "take one of these")
+    check_places(out, plot=plot, read=(source, contacts, against))
+    ids = grain_numbers(grains, "in --grains") if grains else None
+    between = lags(diffusion) if diffusion else None
+    measured = tracking.read_csv(against) if against else None
+    if source.suffix == ".csv":
+        found, notes = tracking.read_csv(source).of(ids), []
+        found = found.at(frame_numbers(frames, len(found.times)))
+    else:
+        opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
+                             contact_columns=contact_columns, units=units)
+        chosen = select(opened, frame_numbers(frames, len(opened.grains)))
+        with progress("tracks", len(chosen.numbers)) as advance:
+            found = tracking.follow(chosen, ids, advance)
+        notes = chosen.lines([])
+    seen = [found] if measured is None else tracking.common(found, measured)
+    movements = {one.name: tracking.measure(one, interval or (measured.interval if measured else None), between) for one in seen}
+    written = []
+    if out:
+        if out.suffix == ".csv":
+            written.append(tracking.write_csv(out, found))
+        else:
+            from .output.netcdf import write_netcdf
 
+            written.append(write_netcdf(out, dataset(found, movements[found.name], **provenance("tracks", source))))
+    if plot:
+        from .plots import save
 
-def _provenance(command: str, source: Path) -> dict[str, str]:
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    return {"title": f"dembark {command} of {source.resolve().name}", "source": str(source),
-            "history": f"{now}: dembark {' '.join(sys.argv[1:])}", "software": f"dembark {version('dembark')}"}
-
-
-def _say(lines: Sequence[str]) -> None:
-    console = Console(highlight=False, soft_wrap=True)
-    for line in lines:
-        console.print(line, markup=False)
-
-
-@contextmanager
-def progress(name: str, total: int, interval: float = 10.0) -> Iterator[Callable[[], None]]:
-    """Gives a function to call after each of `total` frames: it moves a bar in a terminal, and else prints a line every `interval` s."""
-    console = Console(file=sys.stderr, highlight=False, soft_wrap=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("frames"), TimeRemainingColumn())
-    done, spoken = 0, clock.monotonic()
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(name, total=total)
-
-        def advance() -> None:
-            nonlocal done, spoken
-            done += 1
-            bar.advance(task)
-            if not console.is_terminal and clock.monotonic() - spoken >= interval:
-                spoken = clock.monotonic()
-                print(f"dembark: {name}: frame {done} of {total}", file=sys.stderr, flush=True)
-
-        yield advance
+        written += save(plot, figures(movements))
+    say([*notes, *lines(seen, movements), *(f"written: {path}" for path in written)])

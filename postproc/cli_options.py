@@ -130,6 +130,28 @@ def frame_numbers(text: str, count: int) -> list[int]:
     return found
 
 
+def grain_numbers(text: str, where: str) -> tuple[int, ...]:
+    """Numbers of grains, `1,5-9`."""
+    found: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"(\d+)(?:-(\d+))?", part.strip())
+        first, last = (int(match.group(1)), int(match.group(2) or match.group(1))) if match else (0, -1)
+        if last < first:
+            raise DembarkError(f"{part!r} names no grains", where, "give numbers and ranges, such as 1,5-9")
+        if len(found) + last - first >= _MOST_IDS:
+            raise DembarkError(f"{part!r} names too many grains", where, f"there are at most {_MOST_IDS}")
+        found += range(first, last + 1)
+    return tuple(found)
+
+
+def lags(text: str) -> tuple[float, float]:
+    """Two rising times (s), `20ms,0.1`."""
+    ends = [positive("s", "--diffusion")(part) for part in text.split(",")]
+    if len(ends) != 2 or not ends[0] < ends[1]:
+        raise DembarkError(f"{text!r} is not a range", "in --diffusion", "give two rising times, such as 20ms,0.1")
+    return ends[0], ends[1]
+
+
 def contact_columns(text: str) -> dict[str, list[int | str]]:
     """Columns of a foreign dump of contacts by what they are, `first=1,2,3 ids=7,8`; see ContactsDump."""
     found: dict[str, list[int | str]] = {}
@@ -265,14 +287,5 @@ class _WallOptions:
         return STL_UNITS.get(unit, self.diameter)
 
     def ids(self) -> tuple[int, ...]:
-        """Numbers of grains, `1,5-9`."""
-        found: list[int] = []
-        for part in self.needed("ids").split(","):
-            match = re.fullmatch(r"(\d+)(?:-(\d+))?", part.strip())
-            first, last = (int(match.group(1)), int(match.group(2) or match.group(1))) if match else (0, -1)
-            if last < first:
-                raise DembarkError(f"{part!r} names no grains", f"in {self.where}, ids", "give numbers and ranges, such as 1,5-9")
-            if len(found) + last - first >= _MOST_IDS:
-                raise DembarkError(f"{part!r} names too many grains", f"in {self.where}, ids", f"an inclusion has at most {_MOST_IDS}")
-            found += range(first, last + 1)
-        return tuple(found)
+        """Numbers of grains."""
+        return grain_numbers(self.needed("ids"), f"in {self.where}, ids")

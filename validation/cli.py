@@ -187,7 +187,8 @@ def _on_dumps(name: str) -> Callable[[typer.Context], None]:
 
 for _name, _help in (("fields", "Coarse-grain trajectories to fields."), ("walls", "Measure stresses on walls and inclusions."),
                      ("debark", "Degree of debarking and wood damage from impacts."),
-                     ("render", "Draw pictures and films of runs and dumps.")):
+                     ("render", "Draw pictures and films of runs and dumps."),
+                     ("tracks", "Follow single grains, of runs and of experiments.")):
     app.command(_name, add_help_option=False, context_settings=_PASSED_ON, help=_help)(_on_dumps(_name))
 
 

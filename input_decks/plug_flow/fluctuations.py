@@ -11,13 +11,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from dembark.common.errors import RunError
 from dembark.postproc.measurement import Array, Curve, Estimate, over_replicas, profile
 from dembark.postproc.resampling import resampled
-from dembark.postproc.statistics import time_blocks
+from dembark.postproc.tracks import Displacements, growth
 
 from .channel import Channel, Mask
 
@@ -33,18 +32,16 @@ Measure = Callable[["Seen"], float]
 
 
 @dataclass(frozen=True)
-class Seen:
-    """k displacements that begin in the frames `start` (k,): `moves` (k, 2) streamwise and transverse, about the mean flow, over d;
-    `place` (k,): distance from the left wall over d; `width` of the channel in d."""
+class Seen(Displacements):
+    """Displacements streamwise and transverse, about the mean flow, over d; `place` (k,): distance from the left wall
+    over d; `width` of the channel in d."""
 
-    moves: Array
     place: Array
-    start: NDArray[np.int64]
     width: float
 
     def among(self, which: Mask) -> Seen:
         """Those that `which` (k,) marks."""
-        return Seen(self.moves[which], self.place[which], self.start[which], self.width)
+        return Seen(self.moves[which], self.start[which], self.place[which], self.width)
 
     @property
     def core(self) -> Seen:
@@ -55,11 +52,6 @@ class Seen:
     def layer(self) -> Seen:
         """Those in the layers at the side walls."""
         return self.among(np.minimum(self.place, self.width - self.place) < LAYER)
-
-    @property
-    def squares(self) -> Array:
-        """Mean squares (2,): streamwise and transverse."""
-        return np.asarray((self.moves**2).mean(axis=0))
 
     def local_squares(self) -> tuple[Array, Array]:
         """The same (cells, 2) of cells one diameter wide, NaN where there are none; and the cell (k,) of each."""
@@ -72,7 +64,7 @@ class Seen:
     def scaled(self) -> Seen:
         """Displacements over their local standard deviation: what varies across the channel widens no distribution."""
         squares, cell = self.local_squares()
-        return Seen(self.moves / np.sqrt(squares[cell]), self.place, self.start, self.width)
+        return Seen(self.moves / np.sqrt(squares[cell]), self.start, self.place, self.width)
 
 
 def anisotropy(seen: Seen) -> float:
@@ -145,27 +137,23 @@ class Motion:
                            "use more travel")
         both = self.visible[lag:] & self.visible[:-lag]
         place = 0.5 * (self.place[lag:] + self.place[:-lag])
-        return Seen((self.moved[lag:] - self.moved[:-lag])[both], place[both], np.nonzero(both)[0], self.width)
+        return Seen((self.moved[lag:] - self.moved[:-lag])[both], np.nonzero(both)[0], place[both], self.width)
 
     def measured(self, get: Measure, interval: float) -> Estimate:
         """`get` of the displacements over the `interval`, with the interval of what varies in time."""
         seen = self.seen(interval)
-        count = np.bincount(seen.start)
-        blocks = time_blocks(np.bincount(seen.start, seen.moves[:, 0] ** 2) / np.maximum(count, 1))
-        return resampled(lambda keep, _: get(seen.among(keep[seen.start])), blocks)
+        return resampled(lambda keep, _: get(seen.among(keep[seen.start])), seen.blocks())
 
     def diffusion(self) -> Estimate:
         """log10 of the streamwise over the transverse self-diffusion coefficient, from the growth of the mean squares."""
         near, far = (self.seen(interval) for interval in DIFFUSIVE)
-        # Of the same time.
-        near = near.among(near.start <= far.start.max())
-        blocks = time_blocks(np.bincount(far.start, far.moves[:, 0] ** 2) / np.maximum(np.bincount(far.start), 1))
+        earlier = near.until(int(far.start.max()))  # of the same time
 
         def ratio(keep: Mask, _: Mask) -> float:
-            growth = far.among(keep[far.start]).squares - near.among(keep[near.start]).squares
-            return float(np.log10(growth[0] / growth[1])) if (growth > 0.0).all() else np.nan
+            more = growth(earlier, far, keep)
+            return float(np.log10(more[0] / more[1])) if (more > 0.0).all() else np.nan
 
-        return resampled(ratio, blocks)
+        return resampled(ratio, far.blocks())
 
 
 def _visible(one: Channel, places: Array) -> Mask:

@@ -119,7 +119,7 @@ def test_a_channel_that_is_periodic_has_nothing_to_look_through(tmp_path):
 def drawn(moves: Any, places: int = 10) -> Seen:
     """Displacements `moves` (k, 2) at random places of a channel 20 d wide."""
     random = np.random.default_rng(1)
-    return Seen(moves, 20.0 * random.integers(places, size=len(moves)) / places + 0.5, np.arange(len(moves)), 20.0)
+    return Seen(moves, np.arange(len(moves)), 20.0 * random.integers(places, size=len(moves)) / places + 0.5, 20.0)
 
 
 @pytest.mark.parametrize(("draw", "growth"), [
@@ -140,10 +140,10 @@ def test_scales_across_the_channel_change_no_distribution(size, ratio):
     random = np.random.default_rng(2)
     one = drawn(random.standard_t(3.0, (5_000, 2)))
     # Every cell has a size of its own, as where the shear varies.
-    other = Seen(one.moves * (size * (1.0 + np.floor(one.place)))[:, None] * (ratio, 1.0), one.place, one.start, one.width)
+    other = Seen(one.moves * (size * (1.0 + np.floor(one.place)))[:, None] * (ratio, 1.0), one.start, one.place, one.width)
     assert fluctuations.tail_growth(other) == pytest.approx(fluctuations.tail_growth(one), rel=1e-6)
     assert fluctuations.distribution_difference(other) == pytest.approx(fluctuations.distribution_difference(one), abs=1e-4)
-    same = Seen(one.moves * size * (ratio, 1.0), one.place, one.start, one.width)
+    same = Seen(one.moves * size * (ratio, 1.0), one.start, one.place, one.width)
     assert fluctuations.anisotropy(same) == pytest.approx(ratio * fluctuations.anisotropy(one), rel=1e-9)
 
 

@@ -1,0 +1,207 @@
+"""Tracks of random walks with a known diffusion, through the box, with lost grains, as files, and on the command line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray
+from dumps import contacts_text, grains_text
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dembark.common.errors import DembarkError
+from dembark.postproc import tracks as tracking
+from dembark.postproc.sources import open_source, select
+from dembark.postproc.tracks import Tracks, diffusion, measure, read_csv, write_csv
+from dembark.validation.cli import main
+
+STEP, SIGMA = 1e-3, (2e-5, 4e-5, 1e-5)
+EXACT = np.array(SIGMA) ** 2 / (2.0 * STEP)
+
+
+def walk(seed=1, grains=60, frames=401, drift=(0.0, 0.1, 0.0)):
+    """Steps of a normal distribution with a drift (m/s)."""
+    moves = np.random.default_rng(seed).normal(scale=SIGMA, size=(frames - 1, grains, 3)) + STEP * np.array(drift)
+    places = np.concatenate([np.zeros((1, grains, 3)), np.cumsum(moves, axis=0)])
+    return Tracks(np.arange(1, grains + 1), STEP * np.arange(frames), places)
+
+
+def test_a_random_walk_has_its_diffusion_drift_and_gaussian_velocities():
+    found = measure(walk(), lags=(5 * STEP, 20 * STEP))
+    for axis in range(3):
+        one = found.coefficient[axis]
+        assert one.value == pytest.approx(EXACT[axis], abs=max(2.0 * one.half, 0.1 * EXACT[axis]))
+        assert one.half < 0.2 * EXACT[axis]
+        assert found.fluctuation[axis].value == pytest.approx(SIGMA[axis] / STEP, rel=0.02)
+        assert found.flatness[axis].value == pytest.approx(1.0, abs=0.05)
+        assert found.squares[:4, axis] == pytest.approx(2.0 * EXACT[axis] * found.lags[:4], rel=0.05)
+    assert found.velocity[1].value == pytest.approx(0.1, abs=0.001)
+
+
+def test_the_intervals_of_the_diffusion_hold_its_value():
+    held = [abs(one.value - EXACT[0]) <= one.half for seed in range(60)
+            for one in [diffusion(walk(seed, grains=10, frames=201), (2 * STEP, 10 * STEP), 0)]]
+    assert np.mean(held) > 0.85  # 95 % intervals; 60 of them scatter
+
+
+def test_a_straight_flight_does_not_diffuse():
+    """Negative control: the drift alone is no diffusion, and fluctuations of the starting speeds grow as the square of the lag."""
+    walker = walk()
+    flying = Tracks(walker.ids, walker.times, walker.times[:, None, None] * np.array([0.3, 0.0, 0.1]) + np.zeros((1, 60, 1)))
+    found = measure(flying, lags=(5 * STEP, 20 * STEP))
+    assert [one.value for one in found.coefficient] == pytest.approx([0.0] * 3, abs=1e-15)
+    assert found.velocity[0].value == pytest.approx(0.3)
+    speeds = np.random.default_rng(5).normal(size=(60, 3))
+    ballistic = measure(Tracks(walker.ids, walker.times, walker.times[:, None, None] * speeds))
+    assert np.polyfit(np.log(ballistic.lags), np.log(ballistic.squares[:, 0]), 1)[0] == pytest.approx(2.0, abs=1e-6)
+
+
+def dumped(folder, places, image_flags=False, absent=()):
+    """A dump of places (frames, grains, 3) in a periodic box of 1 mm; `absent`: (frame, grain) that are left out."""
+    box, length = ((0.0, 1e-3), (0.0, 1e-3), (-1.0, 1.0)), np.array([1e-3, 1e-3, np.inf])
+    text = ""
+    for frame, place in enumerate(places):
+        images = np.where(np.isfinite(length), np.floor(place / length), 0.0)
+        inside = place - np.where(np.isfinite(length), images * 1e-3, 0.0)
+        one = grains_text(100 * frame, inside, np.full(len(place), 1e-4), velocities=np.full((len(place), 3), 0.5),
+                          images=images if image_flags else None, box=box, flags="pp pp ff")
+        if not image_flags:
+            one = one.replace(" ix iy iz", " a b c")
+        for number, grain in absent:
+            if number == frame:
+                lines = one.splitlines(keepends=True)
+                lines = [line for line in lines if not line.startswith(f"{grain} ")] if len(lines) > 9 else lines
+                one = "".join(lines).replace(f"ATOMS\n{len(place)}\n", f"ATOMS\n{len(place) - 1}\n")
+        text += one
+    (folder / "grains.dump").write_text(text)
+    return folder / "grains.dump"
+
+
+@pytest.mark.parametrize("image_flags", [True, False])
+def test_tracks_go_through_the_faces_of_a_periodic_box(tmp_path, image_flags):
+    exact = 5e-4 + walk(grains=8, frames=60).positions
+    source = open_source(dumped(tmp_path, exact, image_flags), time_step=1e-5)
+    found = tracking.follow(select(source, range(60)))
+    moved = found.positions - found.positions[0]
+    assert np.abs(exact - exact[0])[:, :, 1].max() > 2e-3  # some go round more than twice
+    assert moved == pytest.approx(exact - exact[0], abs=1e-12)
+    assert found.times == pytest.approx(STEP * np.arange(60))
+    assert (found.others["vx"] == 0.5).all()
+
+
+def test_lost_grains_have_gaps_and_come_back(tmp_path):
+    exact = 5e-4 + walk(grains=8, frames=30).positions
+    source = open_source(dumped(tmp_path, exact, absent=[(10, 2), (11, 2), (29, 3)]), time_step=1e-5)
+    found = tracking.follow(select(source, range(30)), [2, 3, 5])
+    lost = ~np.isfinite(found.positions[:, :, 0])
+    assert np.argwhere(lost).tolist() == [[10, 0], [11, 0], [29, 1]]
+    assert found.positions[12:, 0] - found.positions[9, 0] == pytest.approx(exact[12:, 1] - exact[9, 1], abs=1e-12)
+    assert len(found.displacements(1).moves) == 3 * 29 - 3 - 1
+    with pytest.raises(DembarkError, match="there is no grain 77 in the chosen frames"):
+        tracking.follow(select(source, range(30)), [2, 77])
+
+
+def test_contacts_are_counted_with_their_forces(tmp_path):
+    places = np.array([[1e-4, 1e-4, 0.0], [3e-4, 1e-4, 0.0], [5e-4, 1e-4, 0.0]])
+    pairs = np.array([[1, 2], [2, 3]])
+    for frame in range(2):
+        text = contacts_text(100 * frame, places[pairs[:, 0] - 1], places[pairs[:, 1] - 1], pairs, [[3.0, 4.0, 0.0], [0.0, 0.0, 2.0]])
+        with (tmp_path / "contacts.dump").open("a") as file:
+            file.write(text)
+    dumped(tmp_path, np.stack([places, places]))
+    found = tracking.follow(select(open_source(tmp_path, time_step=1e-5), range(2)), [1, 2])
+    assert found.others["contacts"].tolist() == [[1.0, 2.0]] * 2
+    assert found.others["contact_force"].tolist() == [[5.0, 7.0]] * 2
+
+
+@given(st.integers(1, 5), st.integers(2, 6), st.sets(st.sampled_from("xyz"), min_size=2), st.integers(0, 10**6))
+def test_a_file_of_tracks_gives_them_back(tmp_path_factory, grains, frames, axes, seed):
+    random = np.random.default_rng(seed)
+    places = random.normal(size=(frames, grains, len(axes)))
+    places[random.random((frames, grains)) < 0.2] = np.nan
+    places[0, 0] = places[-1, -1] = 0.25
+    seen = np.isfinite(places).all(axis=2)
+    kept, grain = seen.any(axis=1), seen.any(axis=0)
+    tracks = Tracks(np.arange(10, 10 + grains), 0.5 * np.arange(frames), places, "".join(sorted(axes)), {"vx": np.where(seen, 0.5, np.nan)})
+    found = read_csv(write_csv(tmp_path_factory.mktemp("tracks") / "a.csv", tracks))
+    assert found.axes == tracks.axes and found.ids.tolist() == tracks.ids[grain].tolist()
+    assert found.times == pytest.approx(tracks.times[kept])
+    assert found.positions == pytest.approx(places[kept][:, grain], abs=1e-9, nan_ok=True)
+    assert np.array_equal(found.others["vx"], tracks.others["vx"][kept][:, grain], equal_nan=True)
+
+
+def test_units_stand_in_the_header(tmp_path):
+    (tmp_path / "camera.csv").write_text("Grain,grain,time [ms],x [mm],z (mm),vx [cm/s],note\na,1,0,1,2,5,?\nb,1,8,1.5,2,5,\n\n")
+    found = read_csv(tmp_path / "camera.csv")
+    assert found.times == pytest.approx([0.0, 8e-3]) and found.axes == "xz"
+    assert found.positions[:, 0] == pytest.approx(np.array([[1e-3, 2e-3], [1.5e-3, 2e-3]]))
+    assert found.others["vx"][:, 0] == pytest.approx([0.05, 0.05])
+
+
+@pytest.mark.parametrize(("text", "line"), [
+    ("", "has no tracks, it needs a header"),
+    ("time,grain,x,z\n", "has no tracks"),
+    ("time,x,z\n0,1,2\n", "its header has no grain, it must be such as time,grain,x,z"),
+    ("time,grain,x\n0,1,2\n", "its header has no two of x, y and z"),
+    ("time,grain,x,z\n0,1,2,one\n", "row 2, column z: 'one' is no number"),
+    ("time,grain,x,z\n0,1,2\n", "row 2, column z: it is missing"),
+    ("time,grain,x,z\n0,1,nan,3\n", "column x: 'nan' is not finite, leave rows out where a grain is not seen"),
+    ("time,grain,x,z\n0,1.5,2,3\n", "a number of a grain is no integer"),
+    ("time,grain,x,z\n0,1,2,3\n0,1,2,3\n", "grain 1 is there twice at 0 s"),
+    ("time,grain,x,x,z\n0,1,2,3,4\n", "the column x is there twice"),
+    ("time [kg],grain,x,z\n0,1,2,3\n", "cannot convert '1 kg' to s"),
+])
+def test_a_wrong_file_gets_one_line(tmp_path, text, line):
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(DembarkError) as caught:
+        read_csv(tmp_path / "a.csv")
+    assert line in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_frames_at_unequal_intervals_are_refused():
+    one = walk(frames=20)
+    with pytest.raises(DembarkError, match=r"frames lie 0\.001 to 0\.003 s apart, displacements need equal intervals"):
+        measure(one.at([0, 1, 4, 5]))
+    with pytest.raises(DembarkError, match=r"a lag of 1 s is not within 0\.019 s"):
+        measure(one, lags=(1e-3, 1.0))
+
+
+def test_a_run_is_compared_with_a_camera(tmp_path, monkeypatch, capsys):
+    """The camera sees x and z of other grains, every fourth frame."""
+    monkeypatch.chdir(tmp_path)
+    dumped(tmp_path, 5e-4 + walk(grains=20, frames=121).positions, image_flags=True)
+    write_csv(tmp_path / "camera.csv", walk(2, grains=20, frames=121).at(range(0, 121, 4)).along("xz"))
+    words = ["tracks", "grains.dump", "--time-step", "1e-5", "--grains", "1-15", "--against", "camera.csv", "--diffusion", "4ms,12ms"]
+    assert main([*words, "--out", "run.nc", "--plot", "plots"]) == 0
+    told = capsys.readouterr().out
+    assert "grains.dump: 15 grains; 121 frames, 1 ms apart" in told and "camera.csv: 20 grains; 31 frames, 4 ms apart" in told
+    numbers = [line for line in told.splitlines() if line.startswith("  fluctuation")]
+    run, camera = (float(line.split("x ")[1].split(" ±")[0]) for line in numbers)
+    assert run == pytest.approx(SIGMA[0] / STEP / 2.0, rel=0.1) and camera == pytest.approx(run, rel=0.1)
+    assert (tmp_path / "plots/tracks.png").is_file()
+    with xarray.open_dataset("run.nc") as data:
+        assert data.position.shape == (121, 15, 3) and data.seen.values.tolist() == ["x", "z"]
+        assert data.self_diffusion.values == pytest.approx(EXACT[[0, 2]], rel=0.5)
+        assert data.vx.attrs == {"units": "m/s", "long_name": "velocity along x"}
+    assert main(["tracks", "camera.csv", "--grains", "3", "--frames", ":20", "--out", "part.csv"]) == 0
+    part = read_csv(tmp_path / "part.csv")
+    assert part.ids.tolist() == [3] and len(part.times) == 20
+
+
+@pytest.mark.parametrize(("words", "line"), [
+    (["camera.csv", "--out", "a.txt"], "a.txt does not end in .csv or .nc"),
+    (["camera.csv", "--grains", "5-1"], "'5-1' names no grains, in --grains"),
+    (["camera.csv", "--grains", "77"], "there is no grain 77, in camera.csv, it has 20 grains, 1 to 20"),
+    (["camera.csv", "--diffusion", "3ms"], "'3ms' is not a range, in --diffusion"),
+    (["camera.csv", "--against", "absent.csv"], "cannot read absent.csv"),
+    (["camera.csv", "--out", "camera.csv"], "camera.csv is a file that is read"),
+    (["grains.dump"], "the times of the frames are not known"),
+    (["grains.dump", "--time-step", "1e-5", "--frames", "3"], "have one frame, displacements need two"),
+])
+def test_a_mistake_gets_one_line(tmp_path, monkeypatch, capsys, words, line):
+    monkeypatch.chdir(tmp_path)
+    dumped(tmp_path, 5e-4 + walk(grains=3, frames=5).positions)
+    write_csv(tmp_path / "camera.csv", walk(grains=20, frames=41).along("xz"))
+    assert main(["tracks", *words]) == 2
+    told = capsys.readouterr().err.strip()
+    assert line in told and "\n" not in told

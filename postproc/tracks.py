@@ -1,0 +1,347 @@
+"""Tracks of single grains: of a run, or measured by a camera or by positron emission (PEPT), and what both are measured by.
+
+The measures use positions at equal intervals only, as a camera has them: displacements over a lag, their mean, scatter and distribution,
+and the self-diffusion that the growth of their scatter shows. So a run and an experiment are compared by the same instrument.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dembark.common.errors import DembarkError
+from dembark.common.files import write_atomic
+from dembark.common.units import to_si
+
+from .contacts import ContactFrame
+from .dumps.frames import cell
+from .grains import GrainFrame
+from .resampling import resampled
+from .sources import Selection
+from .statistics import Estimate, TimeBlocks, time_blocks
+
+Array = NDArray[np.float64]
+
+AXES = "xyz"
+# Further columns of a file of tracks, with their units.
+OTHERS = {**{f"{letter}{axis}": (unit, f"{name} along {axis}") for letter, unit, name in (
+    ("v", "m/s", "velocity"), ("w", "rad/s", "angular velocity"), ("f", "N", "force")) for axis in AXES},
+    "contacts": ("1", "number of contacts with grains"), "contact_force": ("N", "sum of the forces of these contacts")}
+_HEAD = re.compile(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*")
+_LEAST = 8  # displacements of which a scatter is measured
+
+
+@dataclass(frozen=True)
+class Displacements:
+    """k displacements over a lag: `moves` (k, c) of c components, and the frames `start` (k,) in which they begin."""
+
+    moves: Array
+    start: NDArray[np.int64]
+
+    @property
+    def squares(self) -> Array:
+        """Mean squares (c,)."""
+        return np.asarray((self.moves**2).mean(axis=0))
+
+    @property
+    def scatter(self) -> Array:
+        """Mean squares (c,) about the mean."""
+        return np.asarray(self.moves.var(axis=0))
+
+    def blocks(self) -> TimeBlocks:
+        """Time blocks of the frames up to the last, by the mean squares of the first component in each."""
+        count = np.bincount(self.start)
+        return time_blocks(np.bincount(self.start, self.moves[:, 0] ** 2) / np.maximum(count, 1))
+
+    def over(self, keep: NDArray[np.bool_]) -> Displacements:
+        """Those that begin in the frames that `keep` (frames,) marks."""
+        chosen = keep[self.start]
+        return Displacements(self.moves[chosen], self.start[chosen])
+
+    def until(self, last: int) -> Displacements:
+        """Those that begin in frame `last` at the latest."""
+        return self.over(np.arange(int(self.start.max(initial=0)) + 1) <= last)
+
+
+def growth(near: Displacements, far: Displacements, keep: NDArray[np.bool_]) -> Array:
+    """How much larger the mean squares (c,) of `far`, of a longer lag, are, of those that begin in the frames that `keep` marks."""
+    return far.over(keep).squares - near.over(keep).squares
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Tracks of n grains at T times: `positions` (T, n, c), m, along the c `axes`, NaN where a grain is not seen; without the jumps of a
+    periodic box. `ids` (n,), `times` (T,) in s. `others`: further columns (T, n) by their names in OTHERS. `name` begins messages."""
+
+    ids: NDArray[np.int64]
+    times: Array
+    positions: Array
+    axes: str = AXES
+    others: Mapping[str, Array] = field(default_factory=dict)
+    name: str = "the tracks"
+
+    @property
+    def interval(self) -> float:
+        """Time (s) between two frames; DembarkError where it is not the same for all."""
+        steps = np.diff(self.times)
+        if not len(steps):
+            raise DembarkError(f"{self.name} have one frame", "", "displacements need two")
+        if (np.abs(steps - steps[0]) > 1e-3 * steps[0]).any():
+            raise DembarkError(f"{self.name}: frames lie {steps.min():.4g} to {steps.max():.4g} s apart", "",
+                               "displacements need equal intervals; choose the frames")
+        return float(self.times[-1] - self.times[0]) / len(steps)
+
+    def along(self, axes: str) -> Tracks:
+        """The same with the positions along some of the axes only."""
+        return replace(self, positions=self.positions[:, :, [self.axes.index(axis) for axis in axes]], axes=axes)
+
+    def of(self, ids: Sequence[int] | None) -> Tracks:
+        """Those of some grains (None: of all); DembarkError for one that has no track."""
+        if ids is None:
+            return self
+        absent = sorted(set(ids) - set(self.ids.tolist()))
+        if absent:
+            raise DembarkError(f"there is no grain {absent[0]}", f"in {self.name}", f"it has {_named(self.ids)}")
+        kept = np.isin(self.ids, ids)
+        return replace(self, ids=self.ids[kept], positions=self.positions[:, kept],
+                       others={name: values[:, kept] for name, values in self.others.items()})
+
+    def at(self, frames: Sequence[int]) -> Tracks:
+        """Those at some of the times, by their numbers."""
+        return replace(self, times=self.times[frames], positions=self.positions[frames],
+                       others={name: values[frames] for name, values in self.others.items()})
+
+    def lag(self, time: float) -> int:
+        """The frames that come next to a time (s), at least one; DembarkError where the tracks are shorter."""
+        frames = max(1, round(time / self.interval))
+        if frames >= len(self.times):
+            raise DembarkError(f"{self.name}: a lag of {time:g} s is not within {self.times[-1] - self.times[0]:.4g} s")
+        return frames
+
+    def displacements(self, frames: int) -> Displacements:
+        """Over so many frames, of grains that are seen at both ends; DembarkError of fewer than eight."""
+        moves = self.positions[frames:] - self.positions[:-frames]
+        seen = np.isfinite(moves).all(axis=2)
+        if seen.sum() < _LEAST:
+            raise DembarkError(f"{self.name}: {seen.sum()} displacements over {frames * self.interval:.4g} s are too few")
+        return Displacements(moves[seen], np.nonzero(seen)[0])
+
+
+def common(one: Tracks, other: Tracks) -> list[Tracks]:
+    """Both along the axes that both have."""
+    axes = "".join(axis for axis in one.axes if axis in other.axes)
+    if not axes:
+        raise DembarkError(f"{one.name} and {other.name} have no axis in common")
+    return [one.along(axes), other.along(axes)]
+
+
+def diffusion(tracks: Tracks, lags: tuple[float, float], axis: int) -> Estimate:
+    """Self-diffusion coefficient (m2/s) along an axis, by its number: half the growth of the mean square between two lags (s), about the
+    mean displacement, over their difference. The interval is that of time blocks."""
+    short, long = (tracks.lag(time) for time in lags)
+    if short >= long:
+        raise DembarkError(f"the lags {lags[0]:g} and {lags[1]:g} s are {short} and {long} frames", "", "give two that rise")
+    near, far = tracks.displacements(short), tracks.displacements(long)
+    about = [Displacements(one.moves[:, [axis]] - one.moves[:, [axis]].mean(axis=0), one.start) for one in (near, far)]
+    # Of the same time.
+    near, far = about[0].until(int(about[1].start.max())), about[1]
+    span = 2.0 * (long - short) * tracks.interval
+    return resampled(lambda keep, _: float(growth(near, far, keep)[0]) / span, far.blocks())
+
+
+@dataclass(frozen=True)
+class Movement:
+    """What `measure` finds, along each of the `axes`: `velocity`, mean (m/s); `fluctuation`, root mean square about it (m/s), and
+    `flatness`, fourth moment over that of a Gaussian distribution: 1 of it; both of displacements over one frame. `coefficient` (m2/s):
+    self-diffusion. `lags` (k,) in s and `squares` (k, c) in m2: mean square displacements about the mean; `speeds`: velocities over one
+    frame, (m, c) in m/s."""
+
+    axes: str
+    velocity: Sequence[Estimate]
+    fluctuation: Sequence[Estimate]
+    flatness: Sequence[Estimate]
+    coefficient: Sequence[Estimate]
+    lags: Array
+    squares: Array
+    speeds: Array
+
+
+def measure(tracks: Tracks, interval: float | None = None, lags: tuple[float, float] | None = None) -> Movement:
+    """Measure tracks; velocities are those over `interval` (s; default: one frame), the diffusion that between two `lags` (s; default: a
+    tenth and four tenths of the time). DembarkError for lags that the tracks do not have."""
+    whole = float(tracks.times[-1] - tracks.times[0])
+    frames = 1 if interval is None else tracks.lag(interval)
+    time, moves = frames * tracks.interval, tracks.displacements(frames)
+    speeds, blocks = moves.moves / time, moves.blocks()
+
+    def over(get: Callable[[Array], float]) -> list[Estimate]:
+        return [resampled(lambda keep, _, c=c: get(moves.over(keep).moves[:, c] / time), blocks)  # type: ignore[misc]
+                for c in range(len(tracks.axes))]
+
+    known = np.unique(np.geomspace(1, max(1, len(tracks.times) // 2), 20).astype(int))
+    squares = np.array([tracks.displacements(int(lag)).scatter for lag in known])
+    ends = lags or (0.1 * whole, 0.4 * whole)
+    return Movement(tracks.axes, over(lambda v: float(v.mean())), over(lambda v: float(v.std())), over(_flatness),
+                    [diffusion(tracks, ends, axis) for axis in range(len(tracks.axes))], known * tracks.interval, squares, speeds)
+
+
+def _flatness(values: Array) -> float:
+    about = values - values.mean()
+    square = float((about**2).mean())
+    return float((about**4).mean()) / (3.0 * square**2) if square > 0.0 else math.nan
+
+
+def follow(chosen: Selection, ids: Sequence[int] | None = None, advance: Callable[[], None] = lambda: None) -> Tracks:
+    """The tracks of the grains `ids` (default: those of the first frame) through the frames of a run. DembarkError for grains that no frame
+    has. Positions inside a periodic box are joined over its faces where the dump has no image flags: a grain must then move less than half
+    a period from frame to frame."""
+    source, first = chosen.source, chosen.first
+    wanted = np.unique(np.asarray(first.ids if ids is None else ids, dtype=np.int64))
+    shape = (len(chosen.numbers), len(wanted))
+    places, times = np.full((*shape, 3), np.nan), np.empty(shape[0])
+    columns: dict[str, Array] = {}
+    joined = _Joined(len(wanted))
+    for number, (grains, contacts) in enumerate(source.frames(chosen.numbers)):
+        times[number] = source.time(grains)
+        at = np.minimum(np.searchsorted(grains.ids, wanted), max(len(grains.ids) - 1, 0))
+        there = grains.ids[at] == wanted if len(grains.ids) else np.zeros(len(wanted), bool)
+        row = at[there]
+        places[number, there] = joined(grains, row, there)
+        for name, values in _columns(grains, contacts).items():
+            columns.setdefault(name, np.full(shape, np.nan))[number, there] = values[row]
+        advance()
+    absent = wanted[~np.isfinite(places[:, :, 0]).any(axis=0)]
+    if len(absent):
+        raise DembarkError(f"there is no grain {absent[0]} in the chosen frames", f"{source.path}", f"the first has {_named(first.ids)}")
+    if not source.timed:
+        raise DembarkError("the times of the frames are not known", f"{source.path}", "give --time-step")
+    return Tracks(wanted, times, places, others=columns, name=str(source.path))
+
+
+class _Joined:
+    """Positions without the jumps at the faces of a periodic box."""
+
+    def __init__(self, count: int) -> None:
+        self.last = np.full((count, 3), np.nan)
+
+    def __call__(self, grains: GrainFrame, row: NDArray[np.intp], there: NDArray[np.bool_]) -> Array:
+        """Those of the grains in these rows of a frame, which are those of the tracks that `there` (n,) marks."""
+        places = grains.positions[row]
+        if grains.periodic.any() and np.array_equal(grains.positions, grains.wrapped):
+            edges, before = cell(grains.low, grains.high, grains.tilt), self.last[there]
+            periods = np.where(grains.periodic, np.round(np.linalg.solve(edges.T, (places - before).T).T), 0.0)
+            places = places - np.nan_to_num(periods) @ edges
+        self.last[there] = places
+        return places
+
+
+def _columns(grains: GrainFrame, contacts: ContactFrame | None) -> dict[str, Array]:
+    """Further columns (grains,) of a frame by name: what the dump has."""
+    found: dict[str, Array] = {}
+    for letter, name in (("v", "velocities"), ("w", "omegas"), ("f", "forces")):
+        if grains.has(name):
+            found |= {f"{letter}{axis}": getattr(grains, name)[:, column] for column, axis in enumerate(AXES)}
+    if contacts is not None:
+        size = np.linalg.norm(contacts.forces, axis=1)
+        ends = [np.searchsorted(grains.ids, contacts.ids[:, side]) for side in (0, 1)]
+        inside = [(end < len(grains.ids)) & (grains.ids[np.minimum(end, len(grains.ids) - 1)] == contacts.ids[:, side])
+                  for side, end in enumerate(ends)]
+        pairs = [(end[kept], size[kept]) for end, kept in zip(ends, inside, strict=True)]
+        found["contacts"] = np.asarray(sum(np.bincount(end, minlength=len(grains.ids)) for end, _ in pairs), float)
+        found["contact_force"] = np.asarray(sum(np.bincount(end, force, len(grains.ids)) for end, force in pairs), float)
+    return found
+
+
+def _named(ids: NDArray[np.int64]) -> str:
+    return f"{len(ids)} grains, {ids.min()} to {ids.max()}" if len(ids) else "none"
+
+
+def read_csv(path: Path) -> Tracks:
+    """Measured tracks from a CSV file with a header: `time`, `grain`, two or three of `x`, `y`, `z`, and any of OTHERS, each with its unit
+    in brackets unless it is that of SI: `time [ms],grain,x [mm],z [mm]`. A row for each grain that is seen at a time, in any order; other
+    columns are not read. DembarkError in one line."""
+    try:
+        rows = [row for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) if any(word.strip() for word in row)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DembarkError(f"cannot read {path}", getattr(error, "strerror", None) or str(error)) from None
+    if len(rows) < 2:
+        raise DembarkError(f"{path} has no tracks", "", "it needs a header, such as time,grain,x,z, and rows")
+    columns = _heads(rows[0], path)
+    axes = "".join(axis for axis in AXES if axis in columns)
+    lacking = [name for name in ("time", "grain") if name not in columns]
+    if lacking or len(axes) < 2:
+        raise DembarkError(f"{path}: its header has no {lacking[0] if lacking else 'two of x, y and z'}", "",
+                           "it must be such as time,grain,x,z or time [ms],grain,x [mm],y [mm],z [mm]")
+    table = {name: np.empty(len(rows) - 1) for name in columns}
+    for line, row in enumerate(rows[1:]):
+        for name, (number, factor) in columns.items():
+            try:
+                value = float(row[number])
+            except (IndexError, ValueError):
+                word = f"{row[number]!r} is no number" if number < len(row) else "it is missing"
+                raise DembarkError(f"{path}, row {line + 2}, column {name}: {word}") from None
+            if not math.isfinite(value):
+                raise DembarkError(f"{path}, row {line + 2}, column {name}: {row[number]!r} is not finite", "",
+                                   "leave rows out where a grain is not seen")
+            table[name][line] = value * factor
+    if (table["grain"] != np.round(table["grain"])).any():
+        raise DembarkError(f"{path}: a number of a grain is no integer")
+    ids, of_grain = np.unique(table["grain"].astype(np.int64), return_inverse=True)
+    times, of_time = _equal_times(table["time"])
+    cells = of_time * len(ids) + of_grain
+    if len(np.unique(cells)) < len(cells):
+        twice = int(cells[np.argmax(np.bincount(cells)[cells] > 1)])
+        raise DembarkError(f"{path}: grain {ids[twice % len(ids)]} is there twice at {times[twice // len(ids)]:g} s")
+
+    def spread(name: str) -> Array:
+        out = np.full((len(times), len(ids)), np.nan)
+        out[of_time, of_grain] = table[name]
+        return out
+
+    return Tracks(ids, times, np.stack([spread(axis) for axis in axes], axis=2), axes,
+                  {name: spread(name) for name in OTHERS if name in table}, str(path))
+
+
+def _heads(words: Sequence[str], path: Path) -> dict[str, tuple[int, float]]:
+    """Number and factor to SI of each known column by its name."""
+    known = {"time": "s", "grain": "1", **dict.fromkeys(AXES, "m"), **{name: unit for name, (unit, _) in OTHERS.items()}}
+    found: dict[str, tuple[int, float]] = {}
+    for number, word in enumerate(words):
+        match = _HEAD.fullmatch(word)
+        name, unit = match.groups() if match else (word.strip(), None)
+        if name not in known:
+            continue
+        if name in found:
+            raise DembarkError(f"{path}: the column {name} is there twice")
+        found[name] = number, to_si(f"1 {unit}", known[name], f"{path}, column {name}") if unit else 1.0
+    return found
+
+
+def _equal_times(values: Array) -> tuple[Array, NDArray[np.intp]]:
+    """The times, each once, and which of them each value is; those apart by less than a thousandth of the usual interval are one."""
+    times, which = np.unique(values, return_inverse=True)
+    apart = np.diff(times)
+    new = np.concatenate([[True], apart > 1e-3 * np.median(apart)]) if len(apart) else np.ones(1, bool)
+    return times[new], (np.cumsum(new) - 1)[which]
+
+
+def write_csv(path: Path, tracks: Tracks) -> Path:
+    """Write tracks as `read_csv` reads them: a row for each grain that is seen at a time, SI units."""
+    names = ["time", "grain", *tracks.axes, *(name for name in OTHERS if name in tracks.others)]
+    frame, grain = np.nonzero(np.isfinite(tracks.positions).all(axis=2))
+    columns = [tracks.times[frame], tracks.ids[grain], *tracks.positions[frame, grain].T,
+               *(tracks.others[name][frame, grain] for name in names[2 + len(tracks.axes):])]
+    whole = {"grain", "contacts"}
+    forms = ["%d" if name in whole else "%.10g" for name in names]
+    text = io.StringIO()
+    text.write(",".join(names) + "\n")
+    np.savetxt(text, np.column_stack(columns), fmt=forms, delimiter=",")
+    return write_atomic(path, text.getvalue().encode())
