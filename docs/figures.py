@@ -1,10 +1,13 @@
-"""Draws the figures of the documentation into figures/: friction curves, capillary force curves and the error maps of the models.
+"""Draws the figures of the documentation into figures/: friction curves, capillary force curves, error maps of their models,
+and schemes of integration.
 
-The first error map shows figures/capillary_errors.csv, which capillary_errors.py computes.
+The first error map shows figures/capillary_errors.csv, which capillary_errors.py computes; the schemes of integration are those of
+figures/schemes.json, which benchmarks/schemes.py computes.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -152,6 +155,28 @@ def ratio_map() -> None:
          capillary_ratio_errors.RATIOS, capillary_ratio_errors.ANGLES, cell)
 
 
+def schemes() -> None:
+    """Error over cost of schemes of integration on four problems."""
+    found = json.loads((FOLDER / "schemes.json").read_text(encoding="utf-8"))
+    shown = {"engines": ("leapfrog of the engines", "k", "o"), "verlet": ("velocity Verlet", "C0", "s"),
+             "ab2": ("Adams–Bashforth 2", "C1", "v"), "ab4": ("Adams–Bashforth 4", "C2", "^"), "pece": ("Adams PECE 4", "C3", "D"),
+             "rkf45": ("RKF45, constant step", "C4", "P"),
+             "rkf45_controlled": ("RKF45, controlled", "C4", "x"), "midpoint": ("implicit midpoint", "C5", "*")}
+    problems = {"alternating": ("oscillator, fast and slow by turns", "fastest period"),
+                "impact": ("impact, e = 0.7", "duration of the impact"),
+                "block": ("block that slides, stops, rings", "period of its spring"),
+                "bed": ("50 grains fall on a floor", "duration of an impact")}
+    figure, axes = plt.subplots(2, 2, figsize=(7.2, 6.0))
+    for axis, (name, (title, time)) in zip(axes.ravel(), problems.items(), strict=True):
+        for scheme, (label, colour, marker) in shown.items():
+            rows = [row for row in found[name] if row["scheme"] == scheme]
+            axis.loglog([row["cost"] for row in rows], [row["error"] for row in rows], marker=marker, markersize=3, color=colour,
+                        linestyle="--" if scheme == "rkf45_controlled" else "-", linewidth=0.9, label=label)
+        axis.set(xlabel=f"evaluations of the forces per {time}", ylabel="error", title=title)
+    axes[0, 0].legend(fontsize=6)
+    save(figure, "schemes")
+
+
 def main() -> None:
     """Draw all figures."""
     FOLDER.mkdir(exist_ok=True)
@@ -160,6 +185,7 @@ def main() -> None:
         capillary()
         error_map()
         ratio_map()
+        schemes()
 
 
 if __name__ == "__main__":
