@@ -177,7 +177,7 @@ class Movement:
 def measure(tracks: Tracks, interval: float | None = None, lags: tuple[float, float] | None = None) -> Movement:
     """Measure tracks; velocities are those over `interval` (s; default: one frame), the diffusion that between two `lags` (s; default: a
     tenth and four tenths of the time). DembarkError for lags that the tracks do not have."""
-    whole = float(tracks.times[-1] - tracks.times[0])
+    length = float(tracks.times[-1] - tracks.times[0])
     frames = 1 if interval is None else tracks.lag(interval)
     time, moves = frames * tracks.interval, tracks.displacements(frames)
     speeds, blocks = moves.moves / time, moves.blocks()
@@ -188,7 +188,7 @@ def measure(tracks: Tracks, interval: float | None = None, lags: tuple[float, fl
 
     known = np.unique(np.geomspace(1, max(1, len(tracks.times) // 2), 20).astype(int))
     squares = np.array([tracks.displacements(int(lag)).scatter for lag in known])
-    ends = lags or (0.1 * whole, 0.4 * whole)
+    ends = lags or (0.1 * length, 0.4 * length)
     return Movement(tracks.axes, over(lambda v: float(v.mean())), over(lambda v: float(v.std())), over(_flatness),
                     [diffusion(tracks, ends, axis) for axis in range(len(tracks.axes))], known * tracks.interval, squares, speeds)
 
@@ -339,8 +339,8 @@ def write_csv(path: Path, tracks: Tracks) -> Path:
     frame, grain = np.nonzero(np.isfinite(tracks.positions).all(axis=2))
     columns = [tracks.times[frame], tracks.ids[grain], *tracks.positions[frame, grain].T,
                *(tracks.others[name][frame, grain] for name in names[2 + len(tracks.axes):])]
-    whole = {"grain", "contacts"}
-    forms = ["%d" if name in whole else "%.10g" for name in names]
+    integers = {"grain", "contacts"}
+    forms = ["%d" if name in integers else "%.10g" for name in names]
     text = io.StringIO()
     text.write(",".join(names) + "\n")
     np.savetxt(text, np.column_stack(columns), fmt=forms, delimiter=",")

@@ -173,9 +173,9 @@ def test_a_run_is_compared_with_a_camera(tmp_path, monkeypatch, capsys):
     write_csv(tmp_path / "camera.csv", walk(2, grains=20, frames=121).at(range(0, 121, 4)).along("xz"))
     words = ["tracks", "grains.dump", "--time-step", "1e-5", "--grains", "1-15", "--against", "camera.csv", "--diffusion", "4ms,12ms"]
     assert main([*words, "--out", "run.nc", "--plot", "plots"]) == 0
-    told = capsys.readouterr().out
-    assert "grains.dump: 15 grains; 121 frames, 1 ms apart" in told and "camera.csv: 20 grains; 31 frames, 4 ms apart" in told
-    numbers = [line for line in told.splitlines() if line.startswith("  fluctuation")]
+    said = capsys.readouterr().out
+    assert "grains.dump: 15 grains; 121 frames, 1 ms apart" in said and "camera.csv: 20 grains; 31 frames, 4 ms apart" in said
+    numbers = [line for line in said.splitlines() if line.startswith("  fluctuation")]
     run, camera = (float(line.split("x ")[1].split(" ±")[0]) for line in numbers)
     assert run == pytest.approx(SIGMA[0] / STEP / 2.0, rel=0.1) and camera == pytest.approx(run, rel=0.1)
     assert (tmp_path / "plots/tracks.png").is_file()
@@ -203,5 +203,5 @@ def test_a_mistake_gets_one_line(tmp_path, monkeypatch, capsys, words, line):
     dumped(tmp_path, 5e-4 + walk(grains=3, frames=5).positions)
     write_csv(tmp_path / "camera.csv", walk(grains=20, frames=41).along("xz"))
     assert main(["tracks", *words]) == 2
-    told = capsys.readouterr().err.strip()
-    assert line in told and "\n" not in told
+    said = capsys.readouterr().err.strip()
+    assert line in said and "\n" not in said
