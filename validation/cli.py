@@ -17,7 +17,8 @@ from dembark.common.parallel import cores_here
 from dembark.common.units import seconds
 from dembark.postproc import cli as postproc
 from dembark.validation import doctor, engines, provenance, show
-from dembark.validation.campaigns.plan import Resources, series
+from dembark.validation.campaigns import fitted
+from dembark.validation.campaigns.plan import Resources, predicted, series
 from dembark.validation.case import cli as cases
 from dembark.validation.case import folders
 from dembark.validation.case.resolve import resolve, settings
@@ -38,7 +39,11 @@ app = typer.Typer(name="dembark", help=_ABOUT,
 
 _SET = 'Set a parameter; repeat for more. Units are allowed: --set "grain_diameter=4 mm".'
 _OUT = "Folder for the results; default: results/<profile>/<case>/<variant>/<engine>; required with --set."
+_FITTED = "The fitted.toml of a calibration: each packing has a draw of its posterior, and intervals are those of a prediction."
+_MEMBERS = "How many draws of the posterior, with --parameters; default: 5."
 _INTERVAL = "Wall time between restart files, from which an interrupted run continues: '10 min', or none; default: 10 min."
+
+MEMBERS = 5
 
 Profile = Annotated[str, typer.Option(help="Size of the runs: quick, standard, full, ...")]
 Strict = Annotated[bool, typer.Option("--strict", help="Exit with code 1 when a check failed.")]
@@ -78,6 +83,8 @@ def run(
     profile: Profile = "quick",
     variant: Annotated[str | None, typer.Option(help="Variant of the case; default: the first one.")] = None,
     change: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=_SET)] = None,
+    parameters: Annotated[Path | None, typer.Option(help=_FITTED)] = None,
+    members: Annotated[int | None, typer.Option(min=3, help=_MEMBERS)] = None,
     out: Annotated[Path | None, typer.Option(help=_OUT)] = None,
     ranks: Annotated[int, typer.Option(min=1, help=f"MPI processes for each run ({engines.titles('and', lambda one: one.ranks)}).")] = 1,
     threads: Annotated[int, typer.Option(min=1, help="Threads for each run.")] = 1,
@@ -95,10 +102,16 @@ def run(
     interval = _interval(restart_interval)
     # Everything that the user wrote is checked before an engine is looked for.
     resolve(one, profile, chosen, changes)
-    if out is None and changes:
-        raise DembarkError("--out is missing", "with --set the run is not the one of the profile", "name a folder for its results")
+    if out is None and (changes or parameters):
+        option = "--set" if changes else "--parameters"
+        raise DembarkError("--out is missing", f"with {option} the run is not the one of the profile", "name a folder for its results")
+    if members is not None and parameters is None:
+        raise DembarkError(f"--members {members}", "there is no posterior to draw from", "give --parameters fitted.toml")
     measurement.load(one)
-    planned = series(one, chosen, profile, engines.find(engine), changes)
+    if parameters is None:
+        planned = series(one, chosen, profile, engines.find(engine), changes)
+    else:
+        planned = predicted(one, chosen, profile, engines.find(engine), fitted.read(parameters), members or MEMBERS, changes)
     if restart_interval is not None and not restarts.writes_restarts(planned.runs[0]):
         raise DembarkError(f"--restart-interval {restart_interval}", f"{one.deck(engine)} writes no restart files",
                            "leave it out; see docs/how-to/restarts.md for what a deck needs")

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from statistics import fmean
+from statistics import fmean, median
 from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json
 from dembark.postproc.measurement import FIELDS_FILE, Measurement
 from dembark.postproc.replica import Replica
-from dembark.validation import analysis, engines, provenance
+from dembark.validation import analysis, engines, provenance, results
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.case.model import Case, Study
-from dembark.validation.judge import inputs, measurement, measurement_file, verdict
+from dembark.validation.judge import inputs, measurement, measurement_file, prediction, verdict
 from dembark.validation.judge.result import METRICS, Result, as_json, read
 
 
@@ -49,9 +49,12 @@ def measure(folder: Path, wanted: int | None = None) -> Result:
     if wanted is not None and "replicas" in parameters:
         # Replicas of an earlier request are kept; their records hold the number asked for then.
         parameters["replicas"] = wanted
+    # Of fitted parameters the middle of what the members have, which is in their records.
+    for name in first.get("fitted", {}).get("names", ()):
+        parameters[name] = median(one.record["parameters"][name] for one in runs)
     numbers = {int(one.record["replica"]) for one in runs}
     return Result(
-        case.name, first["variant"], first["engine"], verdict.quantities(case, kept.found, first["variant"]), first["profile"],
+        case.name, first["variant"], first["engine"], verdict.quantities(case, kept.found, first["variant"], first["parameters"], _fitted(folder, first)), first["profile"],
         parameters=parameters, profiles=tuple(kept.found.profiles), remarks=_remarks(case, kept.found),
         picture=case.picture_of({**first["parameters"], **first["derived"]}), references=case.references, provenance=_provenance(runs),
         measured=kept.facts,
@@ -64,6 +67,8 @@ def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str
     fields = ""
     with analysis.collected_warnings() as warnings:
         found = measurement.measure(case, runs)
+        if runs[0].record.get("fitted"):
+            found = prediction.over_members(case, found, [measurement.measure(case, [one]) for one in runs])
         if found.fields is not None:
             # Of the extra `fields`, which cases without fields do without.
             from dembark.postproc.output.netcdf import write_netcdf
@@ -73,6 +78,19 @@ def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str
     gone = filter(None, (analysis.departed(one.folder) for one in runs))
     noted = replace(found, remarks=[*found.remarks, *gone, *dict.fromkeys(warnings)], fields=None)
     return measurement_file.write(folder, measurement_file.Measured(inputs_hash, noted, provenance.measured(), fields))
+
+
+def _fitted(folder: Path, record: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What the parameters of the run with this `record` were fitted to, as `prediction.marked` takes it; empty where they were not: that of
+    its posterior, or the targets of the campaign in whose folder it is, all of which is then the fitted experiment."""
+    if "fitted" in record or len(folder.parents) < 3:
+        return record.get("fitted", {})
+    plan = results.plan(folder.parents[2])
+    for sweep in plan.get("sweeps", ()):
+        if sweep["case"] == record["case"] and any(point["variant"] == record["variant"] for point in sweep["points"]):
+            if targets := sweep.get("sample", {}).get("targets") or plan.get("fitted", {}):
+                return {"case": record["case"], "targets": targets, "conditions": {}}
+    return {}
 
 
 def picture(folder: Path) -> Mapping[str, Any] | None:
@@ -119,5 +137,7 @@ def _provenance(runs: list[Replica]) -> dict[str, Any]:
     wall, speed = ([float(facts[key]) for facts in every if facts.get(key)] for key in ("wall_time", "particle_steps_per_second"))
     return {**{key: value for key, value in every[0].items() if key != "seed"},
             "seeds": [one.record.get("seed") for one in runs], "replicas": len(runs), "wall_time": sum(wall) if wall else None,
+            **({"fitted": {key: runs[0].record["fitted"][key] for key in ("file", "sha256", "case", "variant", "engine", "names")}}
+               if runs[0].record.get("fitted") else {}),
             "integration": worst([one.record.get("integration", {}) for one in runs]),
             "particle_steps_per_second": fmean(speed) if speed else None, "steps": record["steps"], "time_step": record["time_step"]}

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dembark.validation.runs.workflow import Outcome
 
 _SHOWN = {"passed": "[green]pass[/]", "failed": "[bold red]FAIL[/]", "open": "[yellow]open[/]", "information": "",
-          "uncontrolled": "not counted"}
+          "uncontrolled": "not counted", "calibrated": "calibrated"}
 # Columns of the table of quantities that a narrow terminal does without, in this order, and the least width of the names there.
 _NARROW = ("reference interval", "evidence", "95 % interval", "unit", "tolerance")
 _LEAST = 20

@@ -13,7 +13,9 @@ from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Po
 from dembark.postproc.statistics import jackknife
 from dembark.postproc.studies import compared, measured
 
+from . import side_view
 from .drum_profile import DrumFlow, estimates, layer_flux, read
+from .side_view import SideView
 
 HERE = Path(__file__).with_name("reference")
 FLOW = ("surface_speed", "layer_depth", "layer_shape", "zero_crossing")
@@ -23,8 +25,13 @@ METHODS = {"surface_speed": "surface_speed", "zero_crossing": "turn", "layer_dep
 SPEED_READ, PLACE_READ = 0.01, 0.0005
 # The angle depends on it by more than its limits.
 UNKNOWN = "the length of the other code's drum is not known"
-# What makes a run one of the tracked drum.
+# What makes a run one of the tracked drum, and of the drum seen along its axis.
 ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, "grain_diameter": 0.003}
+SEEN = {"drum_radius": 0.042, "drum_depth": 0.02}
+# The outline near the wall is masked in the images.
+SEEN_WITHIN = 0.9
+# 95 % limits over the standard uncertainty.
+CONFIDENT = 1.96
 
 
 def tracked_profile() -> tuple[Array, Array]:
@@ -75,6 +82,42 @@ def other_code() -> dict[str, dict[str, float]]:
             for row in reference_rows(HERE / "sunday_2020.csv")}
 
 
+def seen(speed: float) -> tuple[dict[str, Estimate], Array] | None:
+    """What images show of the drum that turns with `speed` (rad/s): quantities, and its surface as rows x, y, lower and upper level (m),
+    turned so that grains go up on the right; None for a speed that was not published."""
+    rpm = f"{speed * 30.0 / math.pi:.0f}"
+    rows = reference_rows(HERE / "granudrum.csv", rpm=rpm)
+    if not rows:
+        return None
+    surface = np.array([(-row.number("x"), *map(row.number, ("y", "low", "high"))) for row in reference_rows(HERE / "granudrum_surface.csv",
+                                                                                                           rpm=rpm)])[::-1]
+    within = np.hypot(surface[:, 0], surface[:, 1]) < SEEN_WITHIN * SEEN["drum_radius"]
+    found = {row["quantity"]: Estimate(row.number("value"), CONFIDENT * row.number("uncertainty"), "reading of the image") for row in rows}
+    return found, surface[within]
+
+
+def along_the_axis(replicas: Replicas) -> Measurement:
+    """Values and the surface of a drum that was photographed."""
+    views, data = [side_view.read(replica) for replica in replicas], seen(replicas[0].parameters["drum_speed"])
+    found = [side_view.estimates(view, None if data is None else (data[1][:, 0], data[1][:, 1])) for view in views]
+    known = {} if data is None else {**data[0], "side_distance": exact(0.0)}
+    values = {name: Value(pooled(found, name), known.get(name)) for name in found[0]}
+    return Measurement(values, [surfaces(views, None if data is None else data[1])])
+
+
+def surfaces(views: list[SideView], data: Array | None) -> Curve:
+    """The surface y(x), with the measured one."""
+    half = 0.8 * SEEN["drum_radius"]
+    place = np.linspace(-half, half, 68) if data is None else data[:, 0]
+    every = np.ones(len(views[0].dark), bool)
+    values = [view.heights(every, place) for view in views]
+    title, along, across = "Surface seen along the axis", "x (m), grains go up on the right", "y (m)"
+    if data is None:
+        return profile("side_surface", title, along, across, place, values)
+    return profile("side_surface", title, along, across, place, values, reference=data[:, 1],
+                   reference_half=0.5 * (data[:, 3] - data[:, 2]), reference_label="ACCES-GranuDrum images")
+
+
 def measure(replicas: Replicas) -> Measurement:
     """Values and profiles of all replicas of a series."""
     drums, given, variant = [read(replica) for replica in replicas], replicas[0].parameters, replicas[0].record["variant"]
@@ -98,7 +141,11 @@ def measure(replicas: Replicas) -> Measurement:
             values["repose_angle"] = Value(angle, datum, reason=UNKNOWN, detail=compared(angle.value, datum, sim=angle.half).text)
             values["layer_over_diameter"] = Value(divided(depth, d), exact(row["layer"])
                                                   if math.isfinite(row["layer"]) else None)
-    return Measurement(values, [speeds(drums, tracked_drum), densities(drums)])
+    curves = [speeds(drums, tracked_drum), densities(drums)]
+    if all(given[name] == value for name, value in SEEN.items()):
+        view = along_the_axis(replicas)
+        return Measurement(values | dict(view.values), [*view.profiles, *curves])
+    return Measurement(values, curves)
 
 
 def speeds(drums: list[DrumFlow], with_data: bool) -> Curve:

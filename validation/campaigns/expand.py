@@ -148,8 +148,20 @@ def campaign(spec: CampaignSpec, only_cases: Sequence[str] = (), only_engines: S
                 continue
             found[place] = series(point.sweep.case, point.base, point.sweep.profile, engines.find(engine), point.changes, point.variant)
             resources[place] = point.sweep.resources[engine]
-    facts = {"campaign": spec.name, "description": spec.description, "sweeps": _sweeps(spec, all_points)}
-    return Plan(spec.name, tuple(sorted(found.values(), key=lambda one: -one.cost)), facts, resources, spec.retries, spec.measure)
+    facts = {"campaign": spec.name, "description": spec.description, "sweeps": _sweeps(spec, all_points),
+             **({"fitted": dict(spec.fitted)} if spec.fitted else {})}
+    return Plan(spec.name, tuple(sorted(found.values(), key=lambda one: -one.cost)), facts, resources, spec.retries, spec.measure,
+                _tables(spec))
+
+
+def _tables(spec: CampaignSpec) -> tuple[Path, ...]:
+    """The files of the targets; DembarkError for two of one name, for copies of them lie in one folder."""
+    found: dict[str, Path] = {}
+    for sweep in spec.sweeps:
+        for path in (one.file for one in sweep.sample.targets.values() if one.file) if sweep.sample else ():
+            if found.setdefault(path.name, path) != path:
+                raise DembarkError(f"{found[path.name]} and {path} have one name", f"in {spec.path}", "rename one of them")
+    return tuple(found.values())
 
 
 def profile(name: str, cases: Sequence[str] = (), engines: Sequence[str] = ()) -> Plan:

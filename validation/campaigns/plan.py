@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,8 @@ from dembark.validation.case.model import Case
 from dembark.validation.case.resolve import for_replica, portable, resolve
 from dembark.validation.engines import Engine
 
+from .fitted import FittedParameters
+
 # How often a run that was ended from outside is started again.
 RETRIES = 3
 # Of a campaign.
@@ -29,7 +31,8 @@ _BYTES_PER_GRAIN_AND_FRAME = 800
 
 @dataclass(frozen=True)
 class Run:
-    """One simulation; `values` are the resolved parameters in SI units with this replica's own seed."""
+    """One simulation; `values` are the resolved parameters in SI units with this replica's own seed. `fitted`: of a run at a draw of a
+    posterior what that is known by, see `fitted.FittedParameters`."""
 
     case: Case
     variant: str
@@ -37,6 +40,7 @@ class Run:
     engine: Engine
     replica: int
     values: Mapping[str, Value]
+    fitted: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -64,7 +68,8 @@ class Run:
         """Hash of what decides the outcome: parameters, deck and engine, but not the host, the cores, or the number of replicas."""
         parameters = {key: value for key, value in self.values.items() if key != "replicas"}
         facts = {"parameters": parameters, "deck": sources(self.case, self.engine.name),
-                 "engine": [self.engine.name, self.engine.version, self.engine.identity, self.engine.switches()]}
+                 "engine": [self.engine.name, self.engine.version, self.engine.identity, self.engine.switches()],
+                 **({"fitted": self.fitted["sha256"]} if self.fitted else {})}
         return hashlib.sha256(json.dumps(facts, sort_keys=True, allow_nan=False).encode()).hexdigest()
 
 
@@ -108,7 +113,7 @@ class Plan:
     """All that belongs into one results folder: a profile, or a campaign, and its series with the longest first.
 
     `facts` say for people and the report what was asked for; `resources` are those of a series' runs by its place, `measure` those of the
-    job that measures on a cluster.
+    job that measures on a cluster; `tables` are the files that targets were read from.
     """
 
     label: str
@@ -117,6 +122,7 @@ class Plan:
     resources: Mapping[Path, Resources] = field(default_factory=dict)
     retries: int = RETRIES
     measure: Resources = Resources()
+    tables: tuple[Path, ...] = ()
 
     @property
     def folders(self) -> dict[str, Run]:
@@ -143,6 +149,15 @@ def series(case: Case, variant: str, profile: str | None, engine: Engine, change
     count = values.get("replicas")
     numbers = range(1, (count if isinstance(count, int) else 1) + 1)
     return Series(tuple(Run(case, name or variant, profile or "default", engine, k, for_replica(values, k)) for k in numbers))
+
+
+def predicted(case: Case, variant: str, profile: str, engine: Engine, fitted: FittedParameters, count: int,
+              changes: Mapping[str, Value] | None = None) -> Series:
+    """As many runs as `count` says, each with a draw of the posterior of `fitted` and, where the case has packings, a packing of its own."""
+    packings = {"replicas": count} if "replicas" in case.parameters else {}
+    drawn = [series(case, variant, profile, engine, {**one, **packings}) for one in fitted.members(case, count, changes or {})]
+    return Series(tuple(replace(one.runs[0], replica=k, values=for_replica(one.runs[0].values, k), fitted=fitted.facts)
+                        for k, one in enumerate(drawn, start=1)))
 
 
 def of_profile(profile: str, only_cases: Sequence[str] = (), only_engines: Sequence[str] = ()) -> list[Series]:

@@ -12,12 +12,18 @@ from dembark.common.units import finite, to_si
 from dembark.validation.case.model import Case, Declared, Parameter
 from dembark.validation.case.tables import TableReader, Types
 
+from . import targets
 from .plan import MOST_RUNS
-from .sampling import DESIGNS, DISTRIBUTIONS, Sample, Target, Variable
+from .sampling import DESIGNS, DISTRIBUTIONS, Sample, Variable
+from .targets import CurveTarget, Target
 
 _KEYS: dict[str, Types] = {"design": str, "samples": int, "seed": int, "quantities": list, "parameters": dict,
                            "targets": dict}
 _NUMBER = (int, float, str)
+_TARGET: dict[str, Types] = {"value": _NUMBER, "uncertainty": _NUMBER, "file": str, "at": str, "where": dict, "correlation": (int, float)}
+# What to write where a target lacks a key.
+_LACKING = {"value": "give a number or, with a file, the name of its column", "uncertainty": "give its standard uncertainty, > 0",
+            "correlation": "give the length over which errors of the curve are correlated, 0 where they are independent"}
 
 
 class SampleReader(TableReader):
@@ -79,17 +85,44 @@ class SampleReader(TableReader):
             raise AssertionError
         return found[0]
 
-    def targets(self, table: str, entry: Mapping[str, Any], case: Case) -> dict[str, Target]:
-        """What the parameters are to be fitted to, by the name of the quantity."""
-        found = {}
-        for name, given in entry.items():
-            unit, place = self.measured(table, name, case).unit, f"{table}.{name}"
-            self.table(given, place, {"value": _NUMBER, "uncertainty": _NUMBER}, ("value", "uncertainty"))
-            found[name] = Target(self.quantity(place, given["value"], unit, f"value of {name}"),
-                                 self.quantity(place, given["uncertainty"], unit, f"uncertainty of {name}"))
-            if found[name].uncertainty <= 0.0:
-                raise self.fail(place, f"uncertainty of {name} = {found[name].uncertainty:g} is out of range", "it must be > 0")
+    def targets(self, table: str, entry: Mapping[str, Any], case: Case) -> dict[str, Target | CurveTarget]:
+        """What the parameters are to be fitted to, by the name of the quantity or curve."""
+        return {name: self.target(f"{table}.{name}", name, given, case) for name, given in entry.items()}
+
+    def target(self, place: str, name: str, given: Any, case: Case) -> Target | CurveTarget:
+        """One target: two numbers, a row of a table, or with `at` a curve."""
+        self.table(given, place, _TARGET)
+        if missing := [key for key in ("value", "uncertainty", *(["correlation"] if "at" in given else [])) if key not in given]:
+            raise self.fail(place, f"the target {name} has no {' and no '.join(missing)}", _LACKING[missing[0]])
+        unit = "1" if "at" in given else self.measured(place, name, case).unit
+        if "file" not in given:
+            for key in given.keys() & {"at", "where", "correlation"}:
+                raise self.fail(place, f"{key} without a file", "name the table with file = ..., or remove it", key)
+            numbers = [self.quantity(place, given[key], unit, f"{key} of {name}") for key in ("value", "uncertainty")]
+            return self.positive(place, name, Target(*numbers))
+        if not isinstance(given["value"], str):
+            raise self.fail(place, f"value = {given['value']!r} is not the name of a column", "name the column that holds it", "value")
+        try:
+            found = targets.table(targets.find(given["file"], self.path, case.folder), given.get("where", {}))
+            if "at" in given:
+                return self.curve(place, name, given, found)
+            deviation = given["uncertainty"]
+            return self.positive(place, name, Target(targets.one_number(found, given["value"], unit), float(deviation) if not isinstance(
+                deviation, str) else targets.one_number(found, deviation, unit), found.path))
+        except DembarkError as error:
+            raise error if f"[{place}]" in str(error) else self.fail(place, str(error)) from None
+
+    def positive(self, place: str, name: str, found: Target) -> Target:
+        """`found`; DembarkError when its uncertainty is not positive."""
+        if found.uncertainty <= 0.0:
+            raise self.fail(place, f"uncertainty of {name} = {found.uncertainty:g} is out of range", "it must be > 0")
         return found
+
+    def curve(self, place: str, name: str, given: Mapping[str, Any], found: targets.Table) -> CurveTarget:
+        """The target `name` that is a curve."""
+        if given["correlation"] < 0.0:
+            raise self.fail(place, f"correlation of {name} = {given['correlation']:g} is out of range", "it must be >= 0")
+        return targets.curve(found, given["at"], given["value"], given["uncertainty"], float(given["correlation"]))
 
     def quantity(self, table: str, given: Any, unit: str, name: str) -> float:
         """A finite number in `unit`; `name` is what it was given for."""

@@ -15,6 +15,8 @@ from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 from dembark.validation.case.model import Parameter
 
+from .targets import CurveTarget, Target
+
 # Designs that go on: a point that breaks a condition is left out, and more samples begin with the earlier ones.
 SEQUENCES = ("sobol", "halton")
 # Designs of a sensitivity analysis, and how many points each of their groups has more than there are parameters: a trajectory of elementary
@@ -74,14 +76,6 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Target:
-    """What a measured quantity is to be: `value` with its standard `uncertainty`, in the unit of the quantity."""
-
-    value: float
-    uncertainty: float
-
-
-@dataclass(frozen=True)
 class Drawn:
     """The points of a sample, in their order: `rows` of values by parameter, their `quantiles`, and how many points of the sequence were
     `left_out` because they break a condition."""
@@ -101,7 +95,7 @@ class Sample:
     variables: Mapping[str, Variable]
     seed: int = 0
     quantities: tuple[str, ...] = ()
-    targets: Mapping[str, Target] = field(default_factory=dict)
+    targets: Mapping[str, Target | CurveTarget] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -111,7 +105,7 @@ class Sample:
     def facts(self) -> dict[str, Any]:
         """For `plan.json`."""
         return {"design": self.design, "samples": self.samples, "seed": self.seed, "quantities": list(self.quantities),
-                **({"targets": {name: [one.value, one.uncertainty] for name, one in self.targets.items()}} if self.targets else {}),
+                **({"targets": {name: one.facts() for name, one in self.targets.items()}} if self.targets else {}),
                 "parameters": {name: one.words for name, one in self.variables.items()}}
 
     def draw(self, broken: Callable[[Row], str]) -> Drawn:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -103,7 +103,8 @@ class SweepSpec:
 
 @dataclass(frozen=True)
 class CampaignSpec:
-    """A checked campaign file; `measure` is what the job of a cluster may use that measures and writes the report."""
+    """A checked campaign file; `measure` is what the job of a cluster may use that measures and writes the report, `fitted` the targets that
+    its parameters were fitted to, in a file that a calibration wrote."""
 
     path: Path
     name: str
@@ -111,6 +112,7 @@ class CampaignSpec:
     retries: int
     sweeps: tuple[SweepSpec, ...]
     measure: Resources
+    fitted: Mapping[str, Any] = field(default_factory=dict)
 
 
 def shipped_campaigns() -> dict[str, Path]:
@@ -159,7 +161,7 @@ class _Reader(SampleReader):
     """Turns the tables of one campaign file into a CampaignSpec; each mistake names the table it is in."""
 
     def campaign(self, data: Mapping[str, Any]) -> CampaignSpec:
-        self.table(data, "top level", {"campaign": dict, "sweeps": list, "resources": dict}, ("campaign", "sweeps"))
+        self.table(data, "top level", {"campaign": dict, "sweeps": list, "resources": dict, "posterior": dict}, ("campaign", "sweeps"))
         head, resources = data["campaign"], data.get("resources", {})
         self.table(head, "campaign", _CAMPAIGN, ("name",))
         self.folder_name("campaign", head["name"])
@@ -177,7 +179,7 @@ class _Reader(SampleReader):
         return CampaignSpec(
             self.path, head["name"], head.get("description", "").strip(), head.get("retries", RETRIES),
             tuple(self.sweep(f"sweeps {number}", number, entry, head, base) for number, entry in enumerate(data["sweeps"], start=1)),
-            self.changed(f"resources.{MEASURE}", Resources(), measure))
+            self.changed(f"resources.{MEASURE}", Resources(), measure), data.get("posterior", {}).get("targets", {}))
 
     def named(self, name: str) -> dict[str, str]:
         """Case and profile that the name of a campaign, CASE-PROFILE, gives to all sweeps that name none."""

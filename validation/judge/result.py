@@ -31,7 +31,8 @@ class QuantityRecord:
     numbers of the same run. `chance`: probability that the check fails by chance alone, None where there is no chance. `family`: the fact
     that is measured; checks of one family count as one, "" is a check by itself. `cause`: why it fails, where that is known. `decides`:
     what would decide an open check. `samples`: the values of the replicas, in their order, where
-    engines are compared packing by packing.
+    engines are compared packing by packing. `calibrated`: how parameters of the run were fitted to the reference; its agreement is no
+    evidence.
     """
 
     name: str
@@ -60,6 +61,7 @@ class QuantityRecord:
     cause: str = ""
     decides: str = ""
     samples: tuple[float, ...] = ()
+    calibrated: str = ""
 
     def __post_init__(self) -> None:
         """RunError for a verdict or a kind of evidence that does not exist."""
@@ -80,8 +82,10 @@ class QuantityRecord:
 
     @property
     def standing(self) -> str:
-        """passed, uncontrolled (passed, but no wrong physics is known to fail it), failed, open (a check that could not be decided) or
-        information (no check)."""
+        """passed, uncontrolled (passed, but no wrong physics is known to fail it), failed, calibrated (not failed, but the reference was
+        fitted), open (a check that could not be decided) or information (no check)."""
+        if self.calibrated and self.verdict != "fail" and self.tolerance is not None:
+            return "calibrated"
         if self.verdict == "pass":
             return "passed" if self.control else "uncontrolled"
         if self.verdict == "fail":
@@ -148,7 +152,8 @@ class Comparison:
 
 
 # Keys that JSON leaves out where they have their default.
-_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "family", "cause", "decides", "samples", "title", "description")
+_OPTIONAL = ("deviation_half_width", "agreement", "independent", "chance", "family", "cause", "decides", "samples", "calibrated", "title",
+             "description")
 
 
 def as_json(value: QuantityRecord | Result | Comparison) -> dict[str, Any]:

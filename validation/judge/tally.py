@@ -30,13 +30,15 @@ MEANING = {"experiment": "measured values", "theory": "laws and exact solutions"
 @dataclass(frozen=True)
 class Counts:
     """Numbers of quantities: checks that passed, failed or could not be decided (open), and those without a check; apart from
-    them checks that passed but are not counted, for no wrong physics is known to fail them (uncontrolled)."""
+    them checks that passed but are not counted, for no wrong physics is known to fail them (uncontrolled), and checks that did not fail
+    against what the parameters were fitted to (calibrated)."""
 
     passed: int = 0
     failed: int = 0
     open: int = 0
     information: int = 0
     uncontrolled: int = 0
+    calibrated: int = 0
 
     @property
     def checks(self) -> int:
@@ -50,7 +52,8 @@ class Counts:
         failed = f"{self.failed} FAILED" if self.failed else "none failed"
         text = f"{self.passed} of {self.checks} check{plural} passed, {failed}" if self.checks else "no checks"
         return (text + (f", {self.open} open" if self.open else "")
-                + (f"; {self.uncontrolled} without a negative control not counted" if self.uncontrolled else ""))
+                + (f"; {self.uncontrolled} without a negative control not counted" if self.uncontrolled else "")
+                + (f"; {self.calibrated} calibrated, not counted" if self.calibrated else ""))
 
 
 @dataclass(frozen=True)
@@ -83,8 +86,9 @@ class Tally(Counts):
                 f"at most {self.by_chance:.1g} failures would be expected")
 
 
+NOT_COUNTED = ("uncontrolled", "calibrated")
 # How a family stands: as the first of these does that occurs among its members.
-ORDER = ("failed", "open", "passed", "uncontrolled", "information")
+ORDER = ("failed", "calibrated", "open", "passed", "uncontrolled", "information")
 
 
 def families(items: Iterable[Item], record: Callable[[Item], QuantityRecord]) -> list[tuple[str, list[Item]]]:
@@ -104,17 +108,17 @@ def tally(quantities: Iterable[QuantityRecord]) -> Tally:
     for standing, family in families(quantities, lambda one: one):
         checks = [one for one in family if one.standing != "information"]
         kinds[family[0].evidence][standing] += 1
-        members += sum(one.standing != "uncontrolled" for one in checks)
+        members += sum(one.standing not in NOT_COUNTED for one in checks)
         # Members are correlated: their sum is an upper limit of the probability that one of them fails.
-        if known := [one.chance for one in checks if one.chance is not None]:
+        if known := [one.chance for one in checks if one.chance is not None and one.standing != "calibrated"]:
             chances.append(min(1.0, sum(known)))
     total = sum(kinds.values(), Counter())
     by_evidence = {kind: Counts(*_numbers(counts)) for kind, counts in kinds.items() if counts.keys() - {"information"}}
     return Tally(*_numbers(total), members=members, by_evidence=by_evidence, random=len(chances), by_chance=sum(chances))
 
 
-def _numbers(counts: Counter[str]) -> tuple[int, int, int, int, int]:
-    return counts["passed"], counts["failed"], counts["open"], counts["information"], counts["uncontrolled"]
+def _numbers(counts: Counter[str]) -> tuple[int, int, int, int, int, int]:
+    return tuple(counts[one] for one in ("passed", "failed", "open", "information", "uncontrolled", "calibrated"))  # type: ignore[return-value]
 
 
 def of_folder(folder: Path) -> Tally:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from dembark.common.errors import DembarkError
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.statistics import Estimate, tail_probability
 from dembark.validation.case.model import Case, Declared
 
+from . import prediction
 from .decision import decides, packings
 from .result import QuantityRecord
 
 
-def quantities(case: Case, found: Measurement, variant: str = "") -> tuple[QuantityRecord, ...]:
+def quantities(case: Case, found: Measurement, variant: str = "", parameters: Mapping[str, Any] | None = None,
+               fitted: Mapping[str, Any] | None = None) -> tuple[QuantityRecord, ...]:
     """The measured quantities of `variant` as declared, with verdicts, families and known causes of failures, in the order of the
-    declaration; DembarkError for one that is not declared."""
+    declaration; what the `parameters` of the run were `fitted` to is marked, see `prediction.marked`. DembarkError for one that is not
+    declared."""
     order = list(case.quantities)
     matched = [(*declared(case, name), name, value) for name, value in found.values.items()]
     records = []
@@ -25,6 +30,8 @@ def quantities(case: Case, found: Measurement, variant: str = "") -> tuple[Quant
         cause = case.cause(name, one.name, variant) if record.verdict == "fail" else ""
         samples = record.samples if case.paired else ()
         records.append(replace(record, family=_family(case, one, name, variant), cause=cause, samples=samples))
+    if fitted:
+        records = prediction.marked(records, case.name, fitted, parameters or {})
     return tuple(records)
 
 

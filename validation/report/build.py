@@ -21,7 +21,8 @@ from .figures import colour, engine_name, subscripts
 from .gather import ReportData, gather
 
 _HERE = Path(__file__).parent
-_SIGNS = {"passed": "✓ pass", "failed": "✗ FAIL", "open": "○ open", "information": "", "uncontrolled": "not counted"}
+_SIGNS = {"passed": "✓ pass", "failed": "✗ FAIL", "open": "○ open", "information": "", "uncontrolled": "not counted",
+          "calibrated": "calibrated"}
 
 
 def build(folder: Path) -> Path:

@@ -105,7 +105,7 @@ class Fact:
         for one in records:
             # Of engines that are compared, these say nothing that the row does not.
             parts += [] if self.is_pair else [one.detail, one.source]
-            parts += [one.control and f"fails with: {one.control}", one.basis and f"95 % intervals: {one.basis}"]
+            parts += [one.calibrated, one.control and f"fails with: {one.control}", one.basis and f"95 % intervals: {one.basis}"]
         return list(dict.fromkeys(filter(None, parts)))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import json
 import os
 import socket
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,7 @@ from dembark.common.errors import DembarkError
 from dembark.common.files import write_atomic, write_json
 from dembark.common.lock import is_held
 from dembark.validation import engines, provenance, results
+from dembark.validation.campaigns import targets
 from dembark.validation.campaigns.estimate import wall_clock
 from dembark.validation.campaigns.plan import Plan
 from dembark.validation.campaigns.spec import read
@@ -104,8 +106,13 @@ def environment() -> dict[str, str]:
 
 
 def enter(folder: Path, file: Path, plan: Plan, chosen: Options, estimates: Mapping[Path, float | None]) -> None:
-    """Write the copy of the campaign's file into `folder`, and plan.json: what is to be done, who submits it, from where, with what."""
+    """Write the copy of the campaign's file into `folder`, those of its tables, and plan.json: what is to be done, who submits it, from
+    where, with what. DembarkError when targets are not those that the folder's calibration began with."""
+    refuse_changed_targets(folder, plan)
     text = file.read_bytes()
+    for table in plan.tables:
+        (folder / targets.FOLDER).mkdir(exist_ok=True)
+        write_atomic(folder / targets.FOLDER / table.name, table.read_bytes())
     used = {run.engine.name: run.engine.version for one in plan.series for run in one.runs}
     write_atomic(folder / CAMPAIGN_FILE, text)
     submitted: dict[str, Any] = {
@@ -113,6 +120,18 @@ def enter(folder: Path, file: Path, plan: Plan, chosen: Options, estimates: Mapp
         "user": _user(), "decks": str(shipped_root()), "environment": environment(), **provenance.commit(),
         "versions": {"dembark": provenance.package_version("dembark"), **used}}
     write_json(folder / PLAN, {"submitted": submitted, **plan.as_json(estimates)})
+
+
+def refuse_changed_targets(folder: Path, plan: Plan) -> None:
+    """DembarkError when `plan` has other targets than the one in `folder`: a fit to them would look like a continued one."""
+    both = zip(results.plan(folder).get("sweeps", ()), plan.facts.get("sweeps", ()), strict=False)
+    for number, (before, now) in enumerate(both, start=1):
+        known = before.get("sample", {}).get("targets")
+        # As plan.json has them.
+        wanted = json.loads(json.dumps(now.get("sample", {}).get("targets", {})))
+        if known and (words := list(targets.changed(known, wanted))):
+            raise DembarkError(f"the calibration in {folder} began with other targets", f"sweeps {number}: {', '.join(words)}",
+                               "restore them, or choose another folder with --out")
 
 
 def _absolute(value: str) -> str:

@@ -262,6 +262,7 @@ def _execute(run: Run, work: Path, step: int | None, progress: Progress, ended: 
         "case": run.case.name, "variant": run.variant, "profile": run.profile, "engine": run.engine.name, "replica": run.replica,
         "parameters": dict(run.values), "seed": run.values.get("seed"),
         "steps": parser.steps, "time_step": parser.time_step, "impact_id_offset": run.engine.facts.impact_id_offset, "frames": frames,
+        **({"fitted": dict(run.fitted)} if run.fitted else {}),
         "inputs": run.inputs, "deck": deck.sources(run.case, run.engine.name), "command": command,
         "attempts": done.attempts, "resumed_at": list(done.resumed_at), "resume": done.resume, "restart_every": every,
         "integration": outcome.integration(work),

@@ -13,8 +13,10 @@ import numpy as np
 import pandas as pd
 
 from dembark.common.files import write_atomic
+from dembark.validation.campaigns import fitted
 from dembark.validation.campaigns.sampling import Sample
 from dembark.validation.campaigns.spec import SweepSpec
+from dembark.validation.campaigns.targets import CurveTarget
 from dembark.validation.case.resolve import merged
 
 from .posterior import Array, Output, Posterior, everywhere, posterior
@@ -29,6 +31,8 @@ IDENTIFIED, UNIDENTIFIED = 1.0 / 3.0, 0.8
 COMBINED = 0.8
 # Share of the variance of a quantity that its surrogate has to predict.
 PREDICTED = 0.8
+# Standard deviation over the sample, in uncertainties of the target, from which on a component of a curve is fitted.
+LEAST_COMPONENT = 0.1
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,8 @@ class Reached:
 @dataclass(frozen=True)
 class Fit:
     """The fit in one engine and variant: parameters, targets, and the folder name `best_run` of the point whose measurements are nearest to
-    the targets; `values` (n, parameters) are samples of the posterior. `why` there is no fit, "" where there is."""
+    the targets; `values` (n, parameters) are samples of the posterior. `why` there is no fit, "" where there is. `misfits`: target curves
+    that are not reached."""
 
     engine: str
     base: str
@@ -75,6 +80,7 @@ class Fit:
     values: Array | None = None
     density: Array | None = None
     why: str = ""
+    misfits: tuple[str, ...] = ()
 
     @property
     def words(self) -> list[str]:
@@ -94,6 +100,8 @@ class Fit:
                        "more samples are needed, or more packings.")
             if abs(each.value - each.target) > each.half + 1.96 * each.uncertainty:
                 yield f"No parameters within the ranges reach the target of {each.name.replace('_', ' ')}."
+        for name in self.misfits:
+            yield f"The curve {name.replace('_', ' ')} of the target is not reached within its uncertainty."
 
 
 def fits(sweep: Sweep, spec: SweepSpec) -> list[Fit]:
@@ -105,23 +113,88 @@ def fits(sweep: Sweep, spec: SweepSpec) -> list[Fit]:
 
 
 def _fit(spec: SweepSpec, sample: Sample, engine: str, base: str, points: Sequence[Point]) -> Fit:
-    found = [(point, [point.quantity(engine, name) for name in sample.targets]) for point in points]
-    complete = [(point, [one for one in row if one]) for point, row in found if all(row)]
-    least = LEAST_POINTS * len(sample.variables)
-    if len(complete) < least:
-        return Fit(engine, base, why=f"{len(complete)} points with all targets were measured, {least} are needed")
-    places = np.array([point.quantiles for point, _ in complete], float)
-    values = np.array([[one.value for one in row] for _, row in complete], float)
-    variances = np.array([[variance_of_mean(one) or 0.0 for one in row] for _, row in complete])
-    outputs = [Output(name, values[:, at], variances[:, at], one.value, one.uncertainty)
-               for at, (name, one) in enumerate(sample.targets.items())]
+    complete, why = _complete(sample, engine, points)
+    if why:
+        return Fit(engine, base, why=why)
+    outputs: list[Output] = []
+    misfits: dict[str, tuple[float, int]] = {}
+    for name, target in sample.targets.items():
+        if isinstance(target, CurveTarget):
+            parts, *rest = of_curve(name, target, [point.curve(engine, name) or {} for point in complete])
+            outputs, misfits[name] = [*outputs, *parts], (rest[0], rest[1])
+        else:
+            row = [one for point in complete if (one := point.quantity(engine, name))]
+            variances = np.array([variance_of_mean(one) or 0.0 for one in row])
+            outputs.append(Output(name, np.array([one.value for one in row], float), variances, target.value, target.uncertainty))
     if still := [one.name for one in outputs if not np.ptp(one.values) > 0.0]:
         return Fit(engine, base, why=f"{still[0]} is the same at all points")
-    known = posterior(places, outputs, _allowed(spec, sample, base))
-    distance = ((values - [one.target for one in outputs]) ** 2 / (variances + [one.uncertainty**2 for one in outputs])).sum(axis=1)
+    known = posterior(np.array([point.quantiles for point in complete], float), outputs, _allowed(spec, sample, base))
+    distance = sum((one.values - one.target) ** 2 / (one.variances + one.uncertainty**2) for one in outputs)
     drawn = np.array([one.values(known.quantiles[:, at]) for at, one in enumerate(sample.variables.values())], float).T
     return Fit(engine, base, _parameters(sample, known, drawn), tuple(_reached(known, outputs)), tuple(_combined(sample, known)),
-               complete[int(distance.argmin())][0].variant, drawn, known.density)
+               complete[int(np.argmin(distance))].variant, drawn, known.density, misfits=_misfits(known, outputs, misfits))
+
+
+def _complete(sample: Sample, engine: str, points: Sequence[Point]) -> tuple[list[Point], str]:
+    """The points at which all targets were measured, and why there is no fit, "" where there are enough."""
+    curves = {name: one for name, one in sample.targets.items() if isinstance(one, CurveTarget)}
+    for name, one in curves.items():
+        measured = {each["name"]: each for point in points if engine in point.results for each in point.results[engine].profiles}
+        if measured and name not in measured:
+            return [], f"the case measures no curve {name}, but {', '.join(measured)}"
+        place = [number for number in measured.get(name, {}).get("place", ()) if number is not None]
+        if place and (one.at[0] < min(place) or one.at[-1] > max(place)):
+            return [], (f"the target {name} reaches from {one.at[0]:g} to {one.at[-1]:g}, what is measured from {min(place):g} to "
+                        f"{max(place):g}: leave out the places beyond")
+    complete = [point for point in points if all(point.curve(engine, name) if name in curves else point.quantity(engine, name)
+                                                 for name in sample.targets)]
+    least = LEAST_POINTS * len(sample.variables)
+    enough = len(complete) >= least
+    return complete, "" if enough else f"{len(complete)} points with all targets were measured, {least} are needed"
+
+
+def of_curve(name: str, target: CurveTarget, measured: Sequence[Mapping[str, Any]]) -> tuple[list[Output], float, int]:
+    """A curve at the points of a sample as few numbers that are fitted in its place, with the squared distance of the target from what
+    these can express, in its uncertainties, and the degrees of freedom of that.
+
+    The curves over the standard deviations of the target, its correlation taken out, are written in their principal components, as by
+    D. Higdon et al., J. Am. Stat. Assoc. 103 (2008) 570; the target then has the uncertainty 1 in each, and components in which all curves
+    are closer than a tenth of that say nothing.
+    """
+    at, values, deviations = (np.array(one) for one in (target.at, target.values, target.uncertainties))
+    away = np.abs(at[:, None] - at)
+    correlated = np.exp(-away / target.correlation) if target.correlation > 0.0 else np.eye(len(at))
+    whiten = np.linalg.inv(np.linalg.cholesky(correlated * np.outer(deviations, deviations)))
+    table = np.array([_at(one, at) for one in measured]) @ whiten.T
+    middle = table.mean(axis=0)
+    left, sizes, components = np.linalg.svd(table - middle, full_matrices=False)
+    kept = sizes / math.sqrt(len(table)) > LEAST_COMPONENT
+    kept[0] = True
+    wanted = components @ (whiten @ values - middle)
+    rest = float(((whiten @ values - middle) ** 2).sum() - (wanted[kept] ** 2).sum())
+    scores = left * sizes
+    return ([Output(f"{name}, component {k + 1}", scores[:, k], np.zeros(len(table)), float(wanted[k]), 1.0) for k in np.nonzero(kept)[0]],
+            max(rest, 0.0), len(at) - int(kept.sum()))
+
+
+def _at(measured: Mapping[str, Any], places: Array) -> Array:
+    """The measured curve at `places`."""
+    pairs = sorted((x, y) for x, y in zip(measured["place"], measured["value"], strict=True) if x is not None and y is not None)
+    return np.interp(places, *np.array(pairs).T)
+
+
+def _misfits(known: Posterior, outputs: Sequence[Output], misfits: Mapping[str, tuple[float, int]]) -> tuple[str, ...]:
+    """The names of curves from which the most probable point is farther than the uncertainty of the target allows."""
+    from scipy.stats import chi2
+
+    reached = list(_reached(known, outputs))
+    found = []
+    for name, (rest, degrees) in misfits.items():
+        parts = [one for one in reached if one.name.startswith(f"{name}, component ")]
+        total = rest + sum((one.value - one.target) ** 2 / (1.0 + (one.half / 1.96) ** 2) for one in parts)
+        if total > chi2.ppf(0.95, degrees + len(parts)):
+            found.append(name)
+    return tuple(found)
 
 
 def _allowed(spec: SweepSpec, sample: Sample, base: str) -> Callable[[Array], bool]:
@@ -170,22 +243,29 @@ def _combined(sample: Sample, known: Posterior) -> Iterator[tuple[str, str, floa
 
 
 def write_files(folder: Path, name: str, fit: Fit, spec: SweepSpec) -> None:
-    """Write `posterior.csv`, samples with their log density, and `fitted.toml`, a campaign of the most probable point, into `folder`."""
+    """Write `posterior.csv`, samples with their log density, and `fitted.toml`, a campaign of the most probable point, into `folder`.
+    Parameters that the sweep derives are in the samples, too."""
     folder.mkdir(parents=True, exist_ok=True)
-    table = pd.DataFrame(fit.values, columns=[one.name for one in fit.parameters]).assign(log_density=fit.density)
-    write_atomic(folder / "posterior.csv", table.to_csv(index=False).encode())
-    write_atomic(folder / "fitted.toml", fitted_toml(name, fit, spec).encode())
+    table = pd.DataFrame(fit.values, columns=[one.name for one in fit.parameters])
+    rows = [spec.changes(fit.base, row) for row in table.to_dict("records")] if spec.derived else []
+    table = table.assign(**{name: [row[name] for row in rows] for name in spec.derived}, **{fitted.DENSITY: fit.density})
+    content = table.to_csv(index=False).encode()
+    write_atomic(folder / fitted.POSTERIOR, content)
+    write_atomic(folder / fitted.FITTED, fitted_toml(name, fit, spec, content).encode())
 
 
-def fitted_toml(name: str, fit: Fit, spec: SweepSpec) -> str:
-    """A campaign with one point, the most probable one, to check the fit in the engine itself."""
+def fitted_toml(name: str, fit: Fit, spec: SweepSpec, samples: bytes) -> str:
+    """A campaign with one point, the most probable one, to check the fit in the engine itself, and what `samples` of the posterior and
+    targets belong to it, for predictions."""
     best = {one.name: round(one.best) if spec.case.parameters[one.name].is_whole else one.best for one in fit.parameters}
     lines = ["# The most probable parameters; median and 95 % interval of each:",
              *(f"# {one.name}: {one.median:.4g}, {one.low:.4g} to {one.high:.4g}, {one.standing}" for one in fit.parameters),
              "[campaign]", f"name = {json.dumps(f'{name}-fitted')}", "", "[[sweeps]]", f"case = {json.dumps(spec.case.name)}",
              f"profile = {json.dumps(spec.profile)}", f"variant = {json.dumps(fit.base)}", f"engines = {json.dumps([fit.engine])}",
              *([f"replicas = {spec.replicas}"] if spec.replicas else []), f"list = [{_table(best)}]", f"fixed = {_table(spec.fixed)}",
-             f"derived = {_table({key: one.text for key, one in spec.derived.items()})}", ""]
+             f"derived = {_table({key: one.text for key, one in spec.derived.items()})}", "", "[posterior]",
+             f"file = {json.dumps(fitted.POSTERIOR)}", f"sha256 = {json.dumps(fitted.checksum(samples))}", "", "[posterior.targets]",
+             *(f"{key} = {_table(one.facts())}" for key, one in (spec.sample.targets.items() if spec.sample else ())), ""]
     return "\n".join(lines)
 
 

@@ -29,6 +29,10 @@ class Point:
         found = self.results[engine].find(name) if engine in self.results else None
         return found if found and found.value is not None and math.isfinite(found.value) else None
 
+    def curve(self, engine: str, name: str) -> Mapping[str, Any] | None:
+        """The measured curve of that name, as `postproc.resampling.profile` makes it; None where it was not measured."""
+        return next((one for one in self.results[engine].profiles if one["name"] == name), None) if engine in self.results else None
+
 
 @dataclass(frozen=True)
 class Sweep:

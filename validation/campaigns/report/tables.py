@@ -51,7 +51,7 @@ def _cells(sweep: Sweep, values: Mapping[str, Any], engine: str, one: QuantityRe
     yield with_unit(with_interval(one.value, one.interval), one.unit)
     yield with_interval(one.reference, one.reference_interval) if one.reference is not None else ""
     yield "" if one.deviation is None else deviation(one)
-    yield {"information": "", "open": "open", "uncontrolled": "not counted"}.get(one.standing, one.verdict)
+    yield {"information": "", "open": "open", "uncontrolled": "not counted", "calibrated": "calibrated"}.get(one.standing, one.verdict)
 
 
 def _escape(text: str) -> str:

@@ -233,7 +233,7 @@ FIT = SAMPLE.replace('"box"', '"silo"').replace(DIAMETER, "wall_friction = { min
     ('apparent_mass_ratio = { value = "0.6", uncertainty = 0.02 }', ""),
     ("apparent_mas_ratio = { value = 0.6, uncertainty = 0.02 }", "silo does not measure it, did you mean apparent_mass_ratio"),
     ("apparent_mass_ratio = 0.6", "0.6 is not a table"),
-    ("apparent_mass_ratio = { value = 0.6 }", "uncertainty is missing, [sweeps 1.sample.targets.apparent_mass_ratio] of"),
+    ("apparent_mass_ratio = { value = 0.6 }", "the target apparent_mass_ratio has no uncertainty, [sweeps 1.sample.targets.apparent"),
     ("apparent_mass_ratio = { value = 0.6, uncertainty = 0 }", "uncertainty of apparent_mass_ratio = 0 is out of range"),
     ('apparent_mass_ratio = { value = "30 deg", uncertainty = 0.02 }', "value of apparent_mass_ratio: "),
 ])

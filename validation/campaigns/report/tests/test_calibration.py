@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from dembark.validation.campaigns.report.build import build
 from dembark.validation.campaigns.report.posterior import Output, log_density, posterior
 from dembark.validation.campaigns.report.sweeps import sweeps
 from dembark.validation.campaigns.spec import CampaignSpec, read
+from dembark.validation.campaigns.targets import CurveTarget
 from dembark.validation.case import folders
 from dembark.validation.judge.result import QuantityRecord, Result, write
 from dembark.validation.report.gather import Page
@@ -144,6 +146,50 @@ def test_a_fit_keeps_the_conditions_of_the_case(tmp_path: Path) -> None:
     text = text.replace("stress_ratio_k = { value = 0.5, uncertainty = 0.02 }", "")
     found = fit(tmp_path, lambda x: (0.4 + x[1] - x[0], 0.5), text)
     assert found.values is not None and (found.values[:, 1] <= found.values[:, 0] + 1e-12).all()
+
+
+def lines(slope: float, level: float) -> np.ndarray:
+    """A curve at the places of CURVE."""
+    return level + slope * PLACES + 0.3 * slope * PLACES**2
+
+
+PLACES = np.linspace(-1.0, 1.0, 21)
+
+
+def test_a_curve_is_fitted_as_few_numbers() -> None:
+    """Of curves that two parameters make, two components are fitted; the distance of the target from what they express is left."""
+    random = np.random.default_rng(1)
+    truth = lines(0.4, 0.7)
+    target = CurveTarget(tuple(PLACES), tuple(truth), (0.05,) * 21, 0.3, Path("own.csv"))
+    places = qmc.Sobol(2, seed=1).random(32)
+    measured = [{"place": list(PLACES), "value": list(lines(*place) + 0.002 * random.standard_normal(21))} for place in places]
+    outputs, rest, degrees = calibration.of_curve("surface", target, measured)
+    assert [one.name for one in outputs] == ["surface, component 1", "surface, component 2"] and degrees == 19 and rest < 1.0
+    found = posterior(places, outputs)
+    low, high = np.quantile(found.quantiles, [0.025, 0.975], axis=0)
+    assert low[0] < 0.4 < high[0] and low[1] < 0.7 < high[1] and (high - low).max() < 0.4
+    # Independent errors say more than correlated ones.
+    free = posterior(places, calibration.of_curve("surface", replace(target, correlation=0.0), measured)[0])
+    assert free.quantiles.std(axis=0)[1] < 0.7 * found.quantiles.std(axis=0)[1]
+    wavy = replace(target, values=tuple(truth + 0.2 * np.sin(9.0 * PLACES)))
+    assert calibration.of_curve("surface", wavy, measured)[1] > 40.0
+
+
+def test_a_curve_as_target(tmp_path: Path) -> None:
+    (tmp_path / "own.csv").write_text("x,y\n" + "".join(f"{x},{y}\n" for x, y in zip(PLACES, lines(0.4, 0.7), strict=True)))
+    targets = CAMPAIGN[CAMPAIGN.index("apparent_mass_ratio"):]
+    text = CAMPAIGN.replace(targets, 'surface = { file = "own.csv", at = "x", value = "y", uncertainty = 0.03, correlation = 0.2 }\n')
+    spec, facts, found = measured(tmp_path, lambda x: (x[0], x[1]), text)
+
+    def fitted(name: str = "surface", width: float = 1.0) -> calibration.Fit:
+        pages = [Page(one.case, one.variant, Path(), results={one.engine: replace(one, profiles=({"name": name, "place": list(
+            width * PLACES), "value": list(lines(*point.quantiles))},))}) for one, point in zip(found, points(spec), strict=True)]
+        return calibration.fits(sweeps(facts["sweeps"], pages, folders.discover())[0], spec.sweeps[0])[0]
+
+    right = fitted()
+    assert right.parameters[0].low < 0.2 + 0.6 * 0.4 < right.parameters[0].high and not right.misfits
+    assert fitted("outline").why == "the case measures no curve surface, but outline"
+    assert "reaches from -1 to 1, what is measured from -0.5 to 0.5" in fitted(width=0.5).why
 
 
 def test_the_report_has_the_fit_and_its_files(tmp_path: Path) -> None:
