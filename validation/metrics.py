@@ -53,8 +53,9 @@ def measure(folder: Path, wanted: int | None = None) -> Result:
     for name in first.get("fitted", {}).get("names", ()):
         parameters[name] = median(one.record["parameters"][name] for one in runs)
     numbers = {int(one.record["replica"]) for one in runs}
+    judged = verdict.quantities(case, kept.found, first["variant"], first["parameters"], _fitted(folder, first))
     return Result(
-        case.name, first["variant"], first["engine"], verdict.quantities(case, kept.found, first["variant"], first["parameters"], _fitted(folder, first)), first["profile"],
+        case.name, first["variant"], first["engine"], judged, first["profile"],
         parameters=parameters, profiles=tuple(kept.found.profiles), remarks=_remarks(case, kept.found),
         picture=case.picture_of({**first["parameters"], **first["derived"]}), references=case.references, provenance=_provenance(runs),
         measured=kept.facts,
@@ -87,9 +88,9 @@ def _fitted(folder: Path, record: Mapping[str, Any]) -> Mapping[str, Any]:
         return record.get("fitted", {})
     plan = results.plan(folder.parents[2])
     for sweep in plan.get("sweeps", ()):
-        if sweep["case"] == record["case"] and any(point["variant"] == record["variant"] for point in sweep["points"]):
-            if targets := sweep.get("sample", {}).get("targets") or plan.get("fitted", {}):
-                return {"case": record["case"], "targets": targets, "conditions": {}}
+        targets = sweep.get("sample", {}).get("targets") or plan.get("fitted", {})
+        if targets and sweep["case"] == record["case"] and any(point["variant"] == record["variant"] for point in sweep["points"]):
+            return {"case": record["case"], "targets": targets, "conditions": {}}
     return {}
 
 

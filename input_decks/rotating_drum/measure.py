@@ -28,8 +28,6 @@ UNKNOWN = "the length of the other code's drum is not known"
 # What makes a run one of the tracked drum, and of the drum seen along its axis.
 ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, "grain_diameter": 0.003}
 SEEN = {"drum_radius": 0.042, "drum_depth": 0.02}
-# The outline near the wall is masked in the images.
-SEEN_WITHIN = 0.9
 # 95 % limits over the standard uncertainty.
 CONFIDENT = 1.96
 
@@ -83,17 +81,15 @@ def other_code() -> dict[str, dict[str, float]]:
 
 
 def seen(speed: float) -> tuple[dict[str, Estimate], Array] | None:
-    """What images show of the drum that turns with `speed` (rad/s): quantities, and its surface as rows x, y, lower and upper level (m),
-    turned so that grains go up on the right; None for a speed that was not published."""
+    """What images show of the drum that turns with `speed` (rad/s): quantities, and its surface as rows x, y, lower and upper level (m);
+    None for a speed that was not published."""
     rpm = f"{speed * 30.0 / math.pi:.0f}"
     rows = reference_rows(HERE / "granudrum.csv", rpm=rpm)
     if not rows:
         return None
-    surface = np.array([(-row.number("x"), *map(row.number, ("y", "low", "high"))) for row in reference_rows(HERE / "granudrum_surface.csv",
-                                                                                                           rpm=rpm)])[::-1]
-    within = np.hypot(surface[:, 0], surface[:, 1]) < SEEN_WITHIN * SEEN["drum_radius"]
+    surface = [[*map(row.number, ("x", "y", "low", "high"))] for row in reference_rows(HERE / "granudrum_surface.csv", rpm=rpm)]
     found = {row["quantity"]: Estimate(row.number("value"), CONFIDENT * row.number("uncertainty"), "reading of the image") for row in rows}
-    return found, surface[within]
+    return found, np.array(surface)
 
 
 def along_the_axis(replicas: Replicas) -> Measurement:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from dembark.input_decks.rotating_drum import side_view
 from dembark.input_decks.rotating_drum.drum_profile import read
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.validation.case import deck
@@ -175,6 +176,49 @@ def test_all_grains_have_room_and_no_two_touch(variant: str | dict[str, Any]) ->
     assert not ended or ends[moving].min() > 0.0
 
 
+def seen(turned: float = 0.0, bent: float = 1.0, higher: float = 0.0, rpm: float = 15.0) -> dict[str, Any]:
+    """What is judged of grains below the photographed surface, which is `turned` (degrees), `bent` so many times as much about its middle
+    line, and `higher` (m)."""
+    _, surface = drum.seen(rpm * np.pi / 30.0)
+    x, y = surface[:, 0], surface[:, 1]
+    line = np.polyval(np.polyfit(x[np.abs(x) < 0.0084], y[np.abs(x) < 0.0084], 1), x)
+    y = line + bent * (y - line) + np.tan(np.radians(turned)) * x / np.cos(np.radians(40.9)) ** 2 + higher
+    random = np.random.default_rng(4)
+
+    def frame(_: int) -> Any:
+        place = np.stack(np.meshgrid(*[np.arange(-0.042, 0.042, 3e-4)] * 2), axis=-1).reshape(-1, 2) + random.uniform(-3e-4, 3e-4, 2)
+        slope = np.polyfit(x, y, 1)
+        inside = np.where(np.abs(place[:, 0]) < x.max(), np.interp(place[:, 0], x, y), np.polyval(slope, place[:, 0]))
+        place = place[(place[:, 1] < inside - 2e-4) & (np.hypot(*place.T) < 0.0417)]
+        one = SimpleNamespace(positions=np.column_stack([place, np.zeros(len(place))]), radii=np.full(len(place), 3e-4),
+                              types=np.ones(len(place)))
+        one.select = lambda kept: one
+        return one
+
+    frames = [frame(k) for k in range(16)]
+    given = {"drum_radius": 0.042, "drum_speed": rpm * np.pi / 30.0}
+    return judged("rotating_drum", drum.along_the_axis([SimpleNamespace(parameters=given, grains=lambda: frames)]))
+
+
+@pytest.mark.parametrize("rpm", [10.0, 15.0])
+def test_the_photographed_surface_is_measured_as_it_is(rpm: float) -> None:
+    found = seen(rpm=rpm)
+    assert abs(found["side_angle"]["deviation"]) < 0.4 and abs(found["side_bend"]["deviation"]) < 1.0
+    assert found["side_distance"]["value"] < 1e-3 and abs(found["side_dark"]["deviation"]) < 0.006
+    assert {"side_angle", "side_bend", "side_distance", "side_dark"} <= names(found, "pass")
+
+
+def test_of_a_speed_that_was_not_photographed_nothing_is_judged() -> None:
+    found = drum.seen(30.0 * np.pi / 30.0)
+    assert found is None
+
+
+def test_a_shadow_is_that_of_its_discs() -> None:
+    at = np.linspace(-0.95, 0.95, 20)
+    found = side_view.shadow(np.array([[0.0, 0.5]]), np.array([0.25]), at, 0.1)
+    assert (found == (np.hypot(at[:, None], at - 0.5) <= 0.25)).all()
+
+
 def controls_rotating_drum(_folder: Path) -> Iterator[Control]:
     right = verdicts()
     yield Control("a layer that slides as a plug", right, verdicts(power=0.2))
@@ -182,4 +226,8 @@ def controls_rotating_drum(_folder: Path) -> Iterator[Control]:
     yield Control("grains that vanish at the toe", verdicts(speed=0.41, variant="other"), verdicts(speed=0.25, variant="other"))
     right = verdicts(angle=26.1, variant="sunday_smooth")
     yield Control("grains carried over the top at a low speed", right, verdicts(ring=True, variant="sunday_smooth"))
+    right = seen()
+    yield Control("a surface that is turned by 8°", right, seen(turned=-8.0))
+    yield Control("a straight surface", right, seen(bent=0.0))
+    yield Control("a drum that is a tenth fuller", right, seen(higher=0.004))
     yield Control("grains that fall back at a high speed", verdicts(ring=True, variant="sunday_15"), verdicts(variant="sunday_15"))

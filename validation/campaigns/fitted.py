@@ -15,7 +15,7 @@ from dembark.common.errors import DembarkError
 from dembark.common.units import finite
 from dembark.validation.case.folders import find
 from dembark.validation.case.model import Case
-from dembark.validation.case.resolve import merged
+from dembark.validation.case.resolve import merged, portable
 from dembark.validation.case.tables import load_toml
 
 POSTERIOR, FITTED = "posterior.csv", "fitted.toml"
@@ -72,7 +72,7 @@ def read(path: Path) -> FittedParameters:
         raise DembarkError(f"{table} has no samples", "", "fit again")
     case = find(sweep["case"])
     fixed: dict[str, Value] = dict(sweep.get("fixed", {}))
-    conditions = merged(case, sweep["profile"], sweep["variant"], fixed)
+    conditions = portable(merged(case, sweep["profile"], sweep["variant"], fixed))
     facts = {"file": str(path), "sha256": given["sha256"], "case": case.name, "variant": sweep["variant"], "engine": sweep["engines"][0],
              "targets": given["targets"], "names": list(samples[0]),
              "conditions": {name: value for name, value in conditions.items() if name not in samples[0]}}

@@ -103,8 +103,8 @@ class SweepSpec:
 
 @dataclass(frozen=True)
 class CampaignSpec:
-    """A checked campaign file; `measure` is what the job of a cluster may use that measures and writes the report, `fitted` the targets that
-    its parameters were fitted to, in a file that a calibration wrote."""
+    """A checked campaign file; `measure` is what the job of a cluster may use that measures and writes the report, `fitted` are the targets
+    that its parameters were fitted to, in a file that a calibration wrote."""
 
     path: Path
     name: str

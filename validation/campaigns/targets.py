@@ -135,7 +135,8 @@ def curve(found: Table, at: str, value: str, uncertainty: str | float, correlati
     for _, _, deviation, line in rows:
         if not deviation > 0.0:
             raise DembarkError(f"uncertainty = {deviation:g} is out of range", f"{found.path}, line {line}", "it must be > 0")
-    return CurveTarget(*(tuple(row[k] for row in rows) for k in range(3)), correlation, found.path)
+    places, values, own = (tuple(row[k] for row in rows) for k in range(3))
+    return CurveTarget(places, values, own, correlation, found.path)
 
 
 def changed(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:

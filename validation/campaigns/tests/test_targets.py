@@ -64,7 +64,8 @@ def test_a_curve_is_a_table_sorted_by_place() -> None:
 def test_a_reference_of_the_case_needs_no_copy(decks: Path) -> None:
     (decks / "box/reference").mkdir()
     (decks / "box/reference/angles.csv").write_text("angle,error\n33,1\n", encoding="utf-8")
-    assert targets('repose = { file = "angles.csv", value = "angle", uncertainty = "error" }')["repose"].facts() == {"value": 33.0, "uncertainty": 1.0}
+    found = targets('repose = { file = "angles.csv", value = "angle", uncertainty = "error" }')["repose"]
+    assert found.facts() == {"value": 33.0, "uncertainty": 1.0}
 
 
 @pytest.mark.parametrize(("line", "expected"), [
