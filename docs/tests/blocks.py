@@ -171,6 +171,8 @@ NOT_RUN = (
     (r"module load .*|sinfo .*|sacctmgr .*|srun .*", "programs of a cluster"),
     (r"export (?!DEMBARK_DECKS).*", "one's own engines and modules; test_names.py looks the variables up in the code"),
     (r"dembark validate .*|python docs/impact_table\.py .*", "a case in both engines takes minutes; input_decks/tests run it"),
+    (r"dembark calibrate cellulose.*|cd results/campaigns/cellulose/.*|dembark run rotating_drum .*--parameters .*",
+     "takes half an hour; validation/tests/test_fitted.py and validation/campaigns/tests/test_targets.py do it with a stand-in"),
     (r"apt-get install .*", "changes the system"),
     (r"(ch-run|apptainer) .*|mkdir image && .*|bash /scratch/.*",
      "needs the image of `make container`; validation/campaigns/tests/test_user_without_root.py enters it"),

@@ -15,7 +15,7 @@ from dembark.validation.case.tables import TableReader, Types
 from . import targets
 from .plan import MOST_RUNS
 from .sampling import DESIGNS, DISTRIBUTIONS, Sample, Variable
-from .targets import CurveTarget, Target
+from .targets import CurveTarget, Table, Target
 
 _KEYS: dict[str, Types] = {"design": str, "samples": int, "seed": int, "quantities": list, "parameters": dict,
                            "targets": dict}
@@ -98,17 +98,17 @@ class SampleReader(TableReader):
         if "file" not in given:
             for key in given.keys() & {"at", "where", "correlation"}:
                 raise self.fail(place, f"{key} without a file", "name the table with file = ..., or remove it", key)
-            numbers = [self.quantity(place, given[key], unit, f"{key} of {name}") for key in ("value", "uncertainty")]
-            return self.positive(place, name, Target(*numbers))
+            value, deviation = (self.quantity(place, given[key], unit, f"{key} of {name}") for key in ("value", "uncertainty"))
+            return self.positive(place, name, Target(value, deviation))
         if not isinstance(given["value"], str):
             raise self.fail(place, f"value = {given['value']!r} is not the name of a column", "name the column that holds it", "value")
         try:
             found = targets.table(targets.find(given["file"], self.path, case.folder), given.get("where", {}))
             if "at" in given:
                 return self.curve(place, name, given, found)
-            deviation = given["uncertainty"]
-            return self.positive(place, name, Target(targets.one_number(found, given["value"], unit), float(deviation) if not isinstance(
-                deviation, str) else targets.one_number(found, deviation, unit), found.path))
+            value, own = targets.one_number(found, given["value"], unit), given["uncertainty"]
+            deviation = targets.one_number(found, own, unit) if isinstance(own, str) else float(own)
+            return self.positive(place, name, Target(value, deviation, found.path))
         except DembarkError as error:
             raise error if f"[{place}]" in str(error) else self.fail(place, str(error)) from None
 
@@ -118,7 +118,7 @@ class SampleReader(TableReader):
             raise self.fail(place, f"uncertainty of {name} = {found.uncertainty:g} is out of range", "it must be > 0")
         return found
 
-    def curve(self, place: str, name: str, given: Mapping[str, Any], found: targets.Table) -> CurveTarget:
+    def curve(self, place: str, name: str, given: Mapping[str, Any], found: Table) -> CurveTarget:
         """The target `name` that is a curve."""
         if given["correlation"] < 0.0:
             raise self.fail(place, f"correlation of {name} = {given['correlation']:g} is out of range", "it must be >= 0")

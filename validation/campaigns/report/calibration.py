@@ -19,7 +19,7 @@ from dembark.validation.campaigns.spec import SweepSpec
 from dembark.validation.campaigns.targets import CurveTarget
 from dembark.validation.case.resolve import merged
 
-from .posterior import Array, Output, Posterior, everywhere, posterior
+from .posterior import Array, Output, Posterior, Surrogate, everywhere, posterior
 from .sensitivity import variance_of_mean
 from .sweeps import Point, Sweep
 
@@ -31,8 +31,8 @@ IDENTIFIED, UNIDENTIFIED = 1.0 / 3.0, 0.8
 COMBINED = 0.8
 # Share of the variance of a quantity that its surrogate has to predict.
 PREDICTED = 0.8
-# Standard deviation over the sample, in uncertainties of the target, from which on a component of a curve is fitted.
-LEAST_COMPONENT = 0.1
+# Share of the variance of a curve that its components make up, and of that of each component that is predicted.
+SHARE, LEAST_PREDICTED = 0.99, 0.3
 
 
 @dataclass(frozen=True)
@@ -116,19 +116,20 @@ def _fit(spec: SweepSpec, sample: Sample, engine: str, base: str, points: Sequen
     complete, why = _complete(sample, engine, points)
     if why:
         return Fit(engine, base, why=why)
+    places = np.array([point.quantiles for point in complete], float)
     outputs: list[Output] = []
     misfits: dict[str, tuple[float, int]] = {}
     for name, target in sample.targets.items():
         if isinstance(target, CurveTarget):
-            parts, *rest = of_curve(name, target, [point.curve(engine, name) or {} for point in complete])
-            outputs, misfits[name] = [*outputs, *parts], (rest[0], rest[1])
+            parts, rest, degrees = of_curve(name, target, places, [point.curve(engine, name) or {} for point in complete])
+            outputs, misfits[name] = [*outputs, *parts], (rest, degrees)
         else:
             row = [one for point in complete if (one := point.quantity(engine, name))]
             variances = np.array([variance_of_mean(one) or 0.0 for one in row])
             outputs.append(Output(name, np.array([one.value for one in row], float), variances, target.value, target.uncertainty))
     if still := [one.name for one in outputs if not np.ptp(one.values) > 0.0]:
         return Fit(engine, base, why=f"{still[0]} is the same at all points")
-    known = posterior(np.array([point.quantiles for point in complete], float), outputs, _allowed(spec, sample, base))
+    known = posterior(places, outputs, _allowed(spec, sample, base))
     distance = sum((one.values - one.target) ** 2 / (one.variances + one.uncertainty**2) for one in outputs)
     drawn = np.array([one.values(known.quantiles[:, at]) for at, one in enumerate(sample.variables.values())], float).T
     return Fit(engine, base, _parameters(sample, known, drawn), tuple(_reached(known, outputs)), tuple(_combined(sample, known)),
@@ -153,14 +154,16 @@ def _complete(sample: Sample, engine: str, points: Sequence[Point]) -> tuple[lis
     return complete, "" if enough else f"{len(complete)} points with all targets were measured, {least} are needed"
 
 
-def of_curve(name: str, target: CurveTarget, measured: Sequence[Mapping[str, Any]]) -> tuple[list[Output], float, int]:
-    """A curve at the points of a sample as few numbers that are fitted in its place, with the squared distance of the target from what
-    these can express, in its uncertainties, and the degrees of freedom of that.
+def of_curve(name: str, target: CurveTarget, places: Array, measured: Sequence[Mapping[str, Any]]) -> tuple[list[Output], float, int]:
+    """A curve, `measured` at the points of a sample with the quantiles `places`, as few numbers that are fitted in its place, with the
+    squared distance of the target from what these can express, in its uncertainties, and the degrees of freedom of that.
 
     The curves over the standard deviations of the target, its correlation taken out, are written in their principal components, as by
-    D. Higdon et al., J. Am. Stat. Assoc. 103 (2008) 570; the target then has the uncertainty 1 in each, and components in which all curves
-    are closer than a tenth of that say nothing.
+    D. Higdon et al., J. Am. Stat. Assoc. 103 (2008) 570; the target then has the uncertainty 1 in each. The first ones count that make up
+    99 % of the variance, without those that the parameters do not predict: these hold what scatters from run to run.
     """
+    from threadpoolctl import threadpool_limits
+
     at, values, deviations = (np.array(one) for one in (target.at, target.values, target.uncertainties))
     away = np.abs(at[:, None] - at)
     correlated = np.exp(-away / target.correlation) if target.correlation > 0.0 else np.eye(len(at))
@@ -168,13 +171,14 @@ def of_curve(name: str, target: CurveTarget, measured: Sequence[Mapping[str, Any
     table = np.array([_at(one, at) for one in measured]) @ whiten.T
     middle = table.mean(axis=0)
     left, sizes, components = np.linalg.svd(table - middle, full_matrices=False)
-    kept = sizes / math.sqrt(len(table)) > LEAST_COMPONENT
-    kept[0] = True
     wanted = components @ (whiten @ values - middle)
-    rest = float(((whiten @ values - middle) ** 2).sum() - (wanted[kept] ** 2).sum())
-    scores = left * sizes
-    return ([Output(f"{name}, component {k + 1}", scores[:, k], np.zeros(len(table)), float(wanted[k]), 1.0) for k in np.nonzero(kept)[0]],
-            max(rest, 0.0), len(at) - int(kept.sum()))
+    share = np.cumsum(sizes**2) / max((sizes**2).sum(), 1e-300)
+    parts = [Output(f"{name}, component {k + 1}", left[:, k] * sizes[k], np.zeros(len(table)), float(wanted[k]), 1.0)
+             for k in range(1 + int(np.searchsorted(share, SHARE)))]
+    with threadpool_limits(1):
+        parts = [one for number, one in enumerate(parts) if number == 0 or Surrogate(places, one).explained > LEAST_PREDICTED]
+    rest = float(((whiten @ values - middle) ** 2).sum() - sum(one.target**2 for one in parts))
+    return parts, max(rest, 0.0), len(at) - len(parts)
 
 
 def _at(measured: Mapping[str, Any], places: Array) -> Array:

@@ -162,17 +162,17 @@ def test_a_curve_is_fitted_as_few_numbers() -> None:
     truth = lines(0.4, 0.7)
     target = CurveTarget(tuple(PLACES), tuple(truth), (0.05,) * 21, 0.3, Path("own.csv"))
     places = qmc.Sobol(2, seed=1).random(32)
-    measured = [{"place": list(PLACES), "value": list(lines(*place) + 0.002 * random.standard_normal(21))} for place in places]
-    outputs, rest, degrees = calibration.of_curve("surface", target, measured)
+    measured = [{"place": list(PLACES), "value": list(lines(*place) + 0.01 * random.standard_normal(21))} for place in places]
+    outputs, rest, degrees = calibration.of_curve("surface", target, places, measured)
     assert [one.name for one in outputs] == ["surface, component 1", "surface, component 2"] and degrees == 19 and rest < 1.0
     found = posterior(places, outputs)
     low, high = np.quantile(found.quantiles, [0.025, 0.975], axis=0)
     assert low[0] < 0.4 < high[0] and low[1] < 0.7 < high[1] and (high - low).max() < 0.4
     # Independent errors say more than correlated ones.
-    free = posterior(places, calibration.of_curve("surface", replace(target, correlation=0.0), measured)[0])
+    free = posterior(places, calibration.of_curve("surface", replace(target, correlation=0.0), places, measured)[0])
     assert free.quantiles.std(axis=0)[1] < 0.7 * found.quantiles.std(axis=0)[1]
     wavy = replace(target, values=tuple(truth + 0.2 * np.sin(9.0 * PLACES)))
-    assert calibration.of_curve("surface", wavy, measured)[1] > 40.0
+    assert calibration.of_curve("surface", wavy, places, measured)[1] > 40.0
 
 
 def test_a_curve_as_target(tmp_path: Path) -> None:
