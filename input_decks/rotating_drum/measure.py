@@ -27,7 +27,7 @@ SPEED_READ, PLACE_READ = 0.01, 0.0005
 UNKNOWN = "the length of the other code's drum is not known"
 # What makes a run one of the tracked drum, and of the drum seen along its axis.
 ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, "grain_diameter": 0.003}
-SEEN = {"drum_radius": 0.042, "drum_depth": 0.02}
+SEEN = {"drum_radius": 0.042, "drum_depth": 0.02, "solid_filling": 0.262}
 # 95 % limits over the standard uncertainty.
 CONFIDENT = 1.96
 
