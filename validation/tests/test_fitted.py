@@ -100,6 +100,7 @@ def test_the_check_of_a_fit_in_the_engine_is_no_evidence(file: Path, command: Co
     code, out, error = command("submit", str(file), "--out", "o")
     assert code == 0, error
     assert "no checks; 2 calibrated, not counted" in out
+    assert "2 calibrated" in Path("o/report.html").read_text(encoding="utf-8")
     assert tomllib.loads(Path("o/campaign.toml").read_text(encoding="utf-8"))["posterior"]["targets"]["repose"]["value"] == 50.0
 
 
