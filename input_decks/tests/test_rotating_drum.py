@@ -156,7 +156,7 @@ def test_end_walls_hold_the_grains_and_drag_them_with_the_drum(engine: str, simu
 
 
 @pytest.mark.parametrize("variant", [SMALL | {"wall_lining": "grains"}, SMALL | {"ends": "walls"}, "alizadeh", "smooth", "sunday_smooth",
-                                     "sunday_005_slice", "sunday_005_long", "sunday_15"], ids=str)
+                                     "sunday_005_slice", "sunday_005_long", "sunday_15", "cellulose_15"], ids=str)
 def test_all_grains_have_room_and_no_two_touch(variant: str | dict[str, Any]) -> None:
     """Nor one of them and the lining."""
     values = resolve(CASE, "standard", variant, {}) if isinstance(variant, str) else resolve(CASE, None, None, variant)
