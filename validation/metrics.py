@@ -88,9 +88,10 @@ def _fitted(folder: Path, record: Mapping[str, Any]) -> Mapping[str, Any]:
         return record.get("fitted", {})
     plan = results.plan(folder.parents[2])
     for sweep in plan.get("sweeps", ()):
-        targets = sweep.get("sample", {}).get("targets") or plan.get("fitted", {})
+        sampled = sweep.get("sample", {}).get("targets")
+        targets = sampled or plan.get("fitted", {})
         if targets and sweep["case"] == record["case"] and any(point["variant"] == record["variant"] for point in sweep["points"]):
-            return {"case": record["case"], "targets": targets, "conditions": {}}
+            return {"case": record["case"], "targets": targets, "conditions": {}, "sampled": bool(sampled)}
     return {}
 
 

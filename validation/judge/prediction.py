@@ -23,6 +23,7 @@ from .result import QuantityRecord
 # Numbers of a run that do not make it another experiment.
 _CHANCE = {"seed", "replicas"}
 _MEASURED = ("experiment", "code")
+SAMPLED = "a point of the sample of a calibration"
 
 
 def over_members(case: Case, found: Measurement, members: Sequence[Measurement]) -> Measurement:
@@ -96,4 +97,6 @@ def marked(records: Iterable[QuantityRecord], case: str, fitted: Mapping[str, An
         data = one.evidence in _MEASURED and (curves or one.source in sources)
         return "of the experiment that was fitted" if data else ""
 
-    return [replace(one, calibrated=why(one)) for one in records]
+    found = [replace(one, calibrated=why(one)) for one in records]
+    # Points all over the ranges disagree: that is what they are for.
+    return [replace(one, verdict="info", reason=SAMPLED) if one.calibrated and fitted.get("sampled") else one for one in found]

@@ -80,6 +80,12 @@ def test_a_fitted_quantity_that_agrees_is_no_pass() -> None:
     assert tally(prediction.marked([replace(ANGLE, verdict="fail")], "drum", FITTED, {})).failed == 1
 
 
+def test_a_point_of_a_calibration_neither_passes_nor_fails() -> None:
+    points = [replace(ANGLE, verdict=one) for one in ("pass", "fail", "info")]
+    found = prediction.marked(points, "drum", FITTED | {"conditions": {}, "sampled": True}, {})
+    assert [one.standing for one in found] == ["calibrated"] * 3 and found[1].reason == prediction.SAMPLED
+
+
 def test_another_reference_is_evidence() -> None:
     """At another speed another angle was measured."""
     records = (replace(ANGLE, reference=37.6), BEND, OTHER, SUM)
