@@ -205,7 +205,10 @@ def test_the_photographed_surface_is_measured_as_it_is(rpm: float) -> None:
     found = seen(rpm=rpm)
     assert abs(found["side_angle"]["deviation"]) < 0.4 and abs(found["side_bend"]["deviation"]) < 1.0
     assert found["side_distance"]["value"] < 1e-3 and abs(found["side_dark"]["deviation"]) < 0.006
-    assert {"side_angle", "side_bend", "side_distance", "side_dark"} <= names(found, "pass")
+    assert names(found, "pass") == {"side_angle", "side_bend", "side_distance"}
+    # A fuller drum is seen as such, by what sets the filling.
+    fuller = seen(higher=0.004, rpm=rpm)
+    assert fuller["side_dark"]["deviation"] > 0.03 and names(fuller, "fail") == {"side_distance"}
 
 
 def test_of_a_speed_that_was_not_photographed_nothing_is_judged() -> None:
@@ -229,5 +232,4 @@ def controls_rotating_drum(_folder: Path) -> Iterator[Control]:
     right = seen()
     yield Control("a surface that is turned by 8°", right, seen(turned=-8.0))
     yield Control("a straight surface", right, seen(bent=0.0))
-    yield Control("a drum that is a tenth fuller", right, seen(higher=0.004))
     yield Control("grains that fall back at a high speed", verdicts(ring=True, variant="sunday_15"), verdicts(variant="sunday_15"))

@@ -33,6 +33,8 @@ COMBINED = 0.8
 PREDICTED = 0.8
 # Share of the variance of a curve that its components make up, and of that of each component that is predicted.
 SHARE, LEAST_PREDICTED = 0.99, 0.3
+# Distance of curves, in standard uncertainties, from which on the target is not reached, however its errors are correlated.
+FAR = 1.96
 
 
 @dataclass(frozen=True)
@@ -68,8 +70,8 @@ class Reached:
 @dataclass(frozen=True)
 class Fit:
     """The fit in one engine and variant: parameters, targets, and the folder name `best_run` of the point whose measurements are nearest to
-    the targets; `values` (n, parameters) are samples of the posterior. `why` there is no fit, "" where there is. `misfits`: target curves
-    that are not reached."""
+    the targets; `values` (n, parameters) are samples of the posterior. `why` there is no fit, "" where there is. `curves`: names of target
+    curves, and how far they are from the most probable ones (root mean square, in standard uncertainties)."""
 
     engine: str
     base: str
@@ -80,7 +82,7 @@ class Fit:
     values: Array | None = None
     density: Array | None = None
     why: str = ""
-    misfits: tuple[str, ...] = ()
+    curves: tuple[tuple[str, float], ...] = ()
 
     @property
     def words(self) -> list[str]:
@@ -100,8 +102,9 @@ class Fit:
                        "more samples are needed, or more packings.")
             if abs(each.value - each.target) > each.half + 1.96 * each.uncertainty:
                 yield f"No parameters within the ranges reach the target of {each.name.replace('_', ' ')}."
-        for name in self.misfits:
-            yield f"The curve {name.replace('_', ' ')} of the target is not reached within its uncertainty."
+        for name, distance in self.curves:
+            yield (f"The most probable curve {name.replace('_', ' ')} is {distance:.1f} standard uncertainties from the target, root mean "
+                   f"square{': no parameters within the ranges reach it' if distance > FAR else ''}.")
 
 
 def fits(sweep: Sweep, spec: SweepSpec) -> list[Fit]:
@@ -118,11 +121,11 @@ def _fit(spec: SweepSpec, sample: Sample, engine: str, base: str, points: Sequen
         return Fit(engine, base, why=why)
     places = np.array([point.quantiles for point in complete], float)
     outputs: list[Output] = []
-    misfits: dict[str, tuple[float, int]] = {}
+    distances: dict[str, Callable[[Array], float]] = {}
     for name, target in sample.targets.items():
         if isinstance(target, CurveTarget):
-            parts, rest, degrees = of_curve(name, target, places, [point.curve(engine, name) or {} for point in complete])
-            outputs, misfits[name] = [*outputs, *parts], (rest, degrees)
+            parts, distances[name] = of_curve(name, target, places, [point.curve(engine, name) or {} for point in complete])
+            outputs += parts
         else:
             row = [one for point in complete if (one := point.quantity(engine, name))]
             variances = np.array([variance_of_mean(one) or 0.0 for one in row])
@@ -133,7 +136,7 @@ def _fit(spec: SweepSpec, sample: Sample, engine: str, base: str, points: Sequen
     distance = sum((one.values - one.target) ** 2 / (one.variances + one.uncertainty**2) for one in outputs)
     drawn = np.array([one.values(known.quantiles[:, at]) for at, one in enumerate(sample.variables.values())], float).T
     return Fit(engine, base, _parameters(sample, known, drawn), tuple(_reached(known, outputs)), tuple(_combined(sample, known)),
-               complete[int(np.argmin(distance))].variant, drawn, known.density, misfits=_misfits(known, outputs, misfits))
+               complete[int(np.argmin(distance))].variant, drawn, known.density, curves=_curves(known, outputs, distances))
 
 
 def _complete(sample: Sample, engine: str, points: Sequence[Point]) -> tuple[list[Point], str]:
@@ -154,9 +157,10 @@ def _complete(sample: Sample, engine: str, points: Sequence[Point]) -> tuple[lis
     return complete, "" if enough else f"{len(complete)} points with all targets were measured, {least} are needed"
 
 
-def of_curve(name: str, target: CurveTarget, places: Array, measured: Sequence[Mapping[str, Any]]) -> tuple[list[Output], float, int]:
-    """A curve, `measured` at the points of a sample with the quantiles `places`, as few numbers that are fitted in its place, with the
-    squared distance of the target from what these can express, in its uncertainties, and the degrees of freedom of that.
+def of_curve(name: str, target: CurveTarget, places: Array,
+             measured: Sequence[Mapping[str, Any]]) -> tuple[list[Output], Callable[[Array], float]]:
+    """A curve, `measured` at the points of a sample with the quantiles `places`, as few numbers that are fitted in its place; and how far a
+    curve with such numbers is from the target, root mean square, in its standard uncertainties.
 
     The curves over the standard deviations of the target, its correlation taken out, are written in their principal components, as by
     D. Higdon et al., J. Am. Stat. Assoc. 103 (2008) 570; the target then has the uncertainty 1 in each. The first ones count that make up
@@ -167,18 +171,23 @@ def of_curve(name: str, target: CurveTarget, places: Array, measured: Sequence[M
     at, values, deviations = (np.array(one) for one in (target.at, target.values, target.uncertainties))
     away = np.abs(at[:, None] - at)
     correlated = np.exp(-away / target.correlation) if target.correlation > 0.0 else np.eye(len(at))
-    whiten = np.linalg.inv(np.linalg.cholesky(correlated * np.outer(deviations, deviations)))
+    root = np.linalg.cholesky(correlated * np.outer(deviations, deviations))
+    whiten = np.linalg.inv(root)
     table = np.array([_at(one, at) for one in measured]) @ whiten.T
     middle = table.mean(axis=0)
     left, sizes, components = np.linalg.svd(table - middle, full_matrices=False)
     wanted = components @ (whiten @ values - middle)
     share = np.cumsum(sizes**2) / max((sizes**2).sum(), 1e-300)
-    parts = [Output(f"{name}, component {k + 1}", left[:, k] * sizes[k], np.zeros(len(table)), float(wanted[k]), 1.0)
-             for k in range(1 + int(np.searchsorted(share, SHARE)))]
+    parts = {k: Output(f"{name}, component {k + 1}", left[:, k] * sizes[k], np.zeros(len(table)), float(wanted[k]), 1.0)
+             for k in range(1 + int(np.searchsorted(share, SHARE)))}
     with threadpool_limits(1):
-        parts = [one for number, one in enumerate(parts) if number == 0 or Surrogate(places, one).explained > LEAST_PREDICTED]
-    rest = float(((whiten @ values - middle) ** 2).sum() - sum(one.target**2 for one in parts))
-    return parts, max(rest, 0.0), len(at) - len(parts)
+        parts = {k: one for k, one in parts.items() if k == 0 or Surrogate(places, one).explained > LEAST_PREDICTED}
+
+    def distance(scores: Array) -> float:
+        curve = root @ (middle + scores @ components[list(parts)])
+        return float(np.sqrt(np.mean(((curve - values) / deviations) ** 2)))
+
+    return list(parts.values()), distance
 
 
 def _at(measured: Mapping[str, Any], places: Array) -> Array:
@@ -187,18 +196,12 @@ def _at(measured: Mapping[str, Any], places: Array) -> Array:
     return np.interp(places, *np.array(pairs).T)
 
 
-def _misfits(known: Posterior, outputs: Sequence[Output], misfits: Mapping[str, tuple[float, int]]) -> tuple[str, ...]:
-    """The names of curves from which the most probable point is farther than the uncertainty of the target allows."""
-    from scipy.stats import chi2
-
+def _curves(known: Posterior, outputs: Sequence[Output],
+            distances: Mapping[str, Callable[[Array], float]]) -> tuple[tuple[str, float], ...]:
+    """How far the curves of the most probable point are from their targets."""
     reached = list(_reached(known, outputs))
-    found = []
-    for name, (rest, degrees) in misfits.items():
-        parts = [one for one in reached if one.name.startswith(f"{name}, component ")]
-        total = rest + sum((one.value - one.target) ** 2 / (1.0 + (one.half / 1.96) ** 2) for one in parts)
-        if total > chi2.ppf(0.95, degrees + len(parts)):
-            found.append(name)
-    return tuple(found)
+    return tuple((name, distance(np.array([one.value for one in reached if one.name.startswith(f"{name}, component ")])))
+                 for name, distance in distances.items())
 
 
 def _allowed(spec: SweepSpec, sample: Sample, base: str) -> Callable[[Array], bool]:
