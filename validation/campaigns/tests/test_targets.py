@@ -10,7 +10,7 @@ from harness import command, decks, stand_in, stand_in_analysis  # noqa: F401
 
 from dembark.common.files import read_json
 from dembark.validation.campaigns.spec import read
-from dembark.validation.campaigns.targets import CurveTarget, Target
+from dembark.validation.campaigns.targets import CurveTarget, Target, changed
 from dembark.validation.cli import main
 
 pytestmark = pytest.mark.usefixtures("decks", "stand_in")
@@ -123,6 +123,12 @@ def test_a_calibration_goes_on_with_the_targets_that_it_began_with(command: Call
     code, _, error = command("calibrate", "campaign.toml", "--out", "o")
     assert code == 2 and "repose was 30 ± 0.5, now 41 ± 0.8, surface is gone" in error
     assert (read_json(Path("o/plan.json")) or {})["sweeps"][0]["sample"]["targets"] == kept
+
+
+def test_a_plan_of_version_1_has_pairs() -> None:
+    now = {"repose": {"value": 30.0, "uncertainty": 1.0}}
+    assert not list(changed({"repose": [30.0, 1.0]}, now)) and list(changed({"repose": [31.0, 1.0]}, now)) == [
+        "repose was 31 ± 1, now 30 ± 1"]
 
 
 def test_two_tables_of_one_name(capsys: pytest.CaptureFixture[str]) -> None:
