@@ -140,8 +140,8 @@ def curve(found: Table, at: str, value: str, uncertainty: str | float, correlati
 
 
 def changed(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    """What differs between the targets of a plan and those of now, both as `facts` have them, a phrase for each; a plan of version 1.0.0 has
-    pairs of numbers."""
+    """What differs between the targets of a plan and those of now, both as `facts` have them, a phrase for each; a plan of version 1.0.0
+    has pairs of numbers."""
     pair = ("value", "uncertainty")
     before = {name: dict(zip(pair, one, strict=True)) if isinstance(one, list) else one for name, one in before.items()}
     for name in [*before, *(name for name in now if name not in before)]:
