@@ -29,7 +29,7 @@ FixNveSphCoupled::FixNveSphCoupled(LAMMPS *lmp, int narg, char **arg) : SharedFi
 
 /// Shifts wait for the next step: they go with the atoms and into restart files.
 void FixNveSphCoupled::post_create() {
-  if (PairSphCoupled::find(force)->fluid().shifting.coefficient <= 0.0) return;
+  if (!PairSphCoupled::find(force)->fluid().displaces()) return;
   const char *words[] = {"sph_shift", "all", "property/atom", "sph_shift", "vector", "yes", "no", "no", "0.", "0.", "0."};
   shifts_ = modify->add_fix_property_atom(11, const_cast<char **>(words), style);
 }
@@ -44,7 +44,7 @@ int FixNveSphCoupled::setmask() { return INITIAL_INTEGRATE | PRE_FORCE | FINAL_I
 void FixNveSphCoupled::init() {
   pair_ = PairSphCoupled::find(force);
   if (!pair_) fail(PairSphCoupled::missing);
-  if (bool(shifts_) != (pair_->fluid().shifting.coefficient > 0.0)) fail("it must come after pair_style sph/coupled ... shifting");
+  if (bool(shifts_) != pair_->fluid().displaces()) fail("it must come after pair_style sph/coupled ... shifting or xsph");
   double count = 0.0, all = 0.0;
   for (int i = 0; i < atom->nlocal; ++i) count += (atom->mask[i] & groupbit) != 0;
   MPI_Allreduce(&count, &all, 1, MPI_DOUBLE, MPI_SUM, world);

@@ -30,7 +30,7 @@ class FixNveSphCoupled : public dembark_family::SharedFix {
   void write_restart(FILE *);
   void restart(char *);
 
-  /// m, of each atom; nullptr: without shifting.
+  /// m, of each atom; nullptr: without shifting and XSPH.
   double **shifts() const;
 
  private:

@@ -344,6 +344,7 @@ void PairSphCoupled::compute(int eflag, int vflag) {
   if (moved && neighbor->ago == 0) sort_particles();
   for (FixSphBody *solid : solids_) solid->begin_forces(scene_.settings.gravity);
   load();
+  scene_.step = long(update->ntimestep);
   passes_->compute(scene_, moved ? update->dt : 0.0, Images{*this});
   store(moved);
   if (evflag && eflag_global) eng_vdwl = energies().compression;

@@ -11,6 +11,13 @@ using dembark::keywords::Reader;
 using dembark::keywords::refuse;
 using dembark::keywords::text;
 
+/// A whole number of steps, 0: never.
+static int read_interval(Reader &in, const std::string &of) {
+  const double steps = in.number(of, "the steps from one filter to the next, 0: never");
+  if (!(steps >= 0.0 && steps <= 1e9 && steps == std::floor(steps))) refuse(of + ": the steps are a whole number >= 0, not " + text(steps));
+  return int(steps);
+}
+
 Settings read_fluid_settings(const std::vector<std::string> &words, int dimension) {
   Reader in(words);
   Settings s;
@@ -31,6 +38,8 @@ Settings read_fluid_settings(const std::vector<std::string> &words, int dimensio
     else if (of == "boundary") s.boundary = Boundary(in.choice(of, "the pressure of walls", boundary_names()));
     else if (of == "no_slip") s.no_slip = in.choice(of, "the value", no_yes) == 1;
     else if (of == "shifting") s.shifting.coefficient = in.number(of, "the coefficient");
+    else if (of == "xsph") s.xsph.epsilon = in.number(of, "epsilon");
+    else if (of == "shepard") s.shepard = read_interval(in, of);
     else if (of == "coupling") {
       if (in.choice(of, "the force between fluid and bodies", {"pressure", "potential"}) == 0) continue;
       s.contact.stiffness = in.positive(of, "K (Pa/m^3, in the plane Pa/m^2)");
@@ -40,7 +49,7 @@ Settings read_fluid_settings(const std::vector<std::string> &words, int dimensio
     } else {
       refuse("'" + of +
              "' is no keyword; known are spacing, sound_speed, density, gamma, tension, smoothing, kernel, alpha, delta, "
-             "boundary, no_slip, shifting and coupling");
+             "boundary, no_slip, shifting, xsph, shepard and coupling");
     }
   }
   if (s.spacing == 0.0) refuse("spacing (m) is missing: that of the lattice that the fluid begins as");

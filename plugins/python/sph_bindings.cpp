@@ -97,7 +97,8 @@ void bind_sph(nb::module_& m) {
           [](Solver* self, Points positions, Array densities, Points velocities, int dimension, double spacing, double smoothing,
              const std::string& kernel, double density, double sound_speed, double gamma, bool tension, double alpha, double delta,
              const Three& gravity, const std::string& boundary, bool no_slip, double shifting, double contact_stiffness,
-             int contact_exponent, double skin, int threads, double slit_pressure, const std::string& instruction_set) {
+             int contact_exponent, double skin, int threads, double slit_pressure, double xsph, int shepard,
+             const std::string& instruction_set) {
             const Settings settings{dimension,
                                     spacing,
                                     smoothing,
@@ -112,13 +113,15 @@ void bind_sph(nb::module_& m) {
                                     {contact_stiffness, contact_exponent},
                                     skin,
                                     threads,
-                                    slit_pressure};
+                                    slit_pressure,
+                                    {xsph},
+                                    shepard};
             new (self) Solver(settings, vectors(positions), std::vector<double>(densities.data(), densities.data() + densities.size()),
                               vectors(velocities), instruction_set == "best" ? best_loops() : portable_loops());
           },
           "positions"_a, "densities"_a, "velocities"_a, "dimension"_a, "spacing"_a, "smoothing"_a, "kernel"_a, "density"_a, "sound_speed"_a,
           "gamma"_a, "tension"_a, "alpha"_a, "delta"_a, "gravity"_a, "boundary"_a, "no_slip"_a, "shifting"_a, "contact_stiffness"_a,
-          "contact_exponent"_a, "skin"_a, "threads"_a, "slit_pressure"_a, "instruction_set"_a)
+          "contact_exponent"_a, "skin"_a, "threads"_a, "slit_pressure"_a, "xsph"_a, "shepard"_a, "instruction_set"_a)
       .def(
           "add",
           [](Solver& self, Points points, bool free, double mass, const Three& inertia, const Three& position) {

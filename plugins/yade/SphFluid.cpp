@@ -54,6 +54,8 @@ sph::Settings SphFluid::settings() const {
 	s.skin          = skin;
 	s.threads       = threads;
 	s.slit_pressure = slitPressure;
+	s.xsph          = {xsph};
+	s.shepard       = shepard;
 	dembark_yade::choose("SphFluid.kernel", kernel, sph::kernel_names(), s.kernel);
 	dembark_yade::choose("SphFluid.boundary", boundary, sph::boundary_names(), s.boundary);
 	if (const char* const wrong = s.error()) fail(sph_fluid::inYade(wrong));

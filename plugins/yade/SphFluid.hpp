@@ -56,6 +56,8 @@ public:
 		((bool,tension,false,,"Keep negative pressures, for closed vessels"))
 		((bool,noSlip,false,,"Viscosity acts at walls and bodies, too"))
 		((Real,shifting,0,,"Coefficient of shifting, 2 is usual; 0 = none"))
+		((Real,xsph,0,,"Epsilon of XSPH, 0...1: how far particles drift with the mean velocity around them; 0 = none, 0.5 is usual"))
+		((int,shepard,0,,"Steps of the fluid from one of Shepard's filters of density to the next; 0 = none, 30 is usual"))
 		((Real,contactStiffness,0,,"Contact potential between fluid and bodies in the place of pressure [Pa/m^3, in the plane Pa/m^2]; 0 = none"))
 		((int,contactExponent,4,,"Exponent of the contact potential, >= 1"))
 		((Real,slitPressure,1,,"Share of the pressure around it that a film has between faces of boxes or on a plane, 0...1"))
@@ -121,4 +123,4 @@ REGISTER_SERIALIZABLE(SphFluid);
 
 }  // namespace yade
 
-DEMBARK_SAVED_FORMAT(SphFluid, 1)
+DEMBARK_SAVED_FORMAT(SphFluid, 2)

@@ -9,6 +9,8 @@
 #include "../vec3.hpp"
 #include "kernels.hpp"
 #include "pair_terms.hpp"
+#include "shepard.hpp"
+#include "xsph.hpp"
 
 namespace dembark::sph {
 
@@ -34,7 +36,7 @@ struct LoopArguments {
   PairCoefficients pair{};
   double volume = 0.0;                     ///< m/rho_0, of shifting
   double* rate = nullptr;                  ///< of density, kg/m^3/s
-  Quad* shift = nullptr;                   ///< grad C and divergence of positions
+  Quad* shift = nullptr;                   ///< grad C and divergence of positions; of xsph_pairs
   Quad* sum = nullptr;                     ///< accelerations (m/s^2), or what the loop says
   Vec3<double>* velocity_sum = nullptr;    ///< of wall_sums
   const Vec3<double>* velocity = nullptr;  ///< of the solid particles themselves, m/s
@@ -223,6 +225,56 @@ double force_across(const LoopArguments& in) {
   return total(lost);
 }
 
+/// Sums of XSPH over fluid pairs, `shift`: of (v_j - v_i) W/rho_ij. b: rho.
+template <class P, class Kernel>
+double xsph_pairs(const LoopArguments& in) {
+  const Kernel kernel(in.dimension, in.h);
+  for (int i = in.begin; i < in.end; ++i) {
+    const Record& own = in.own[i];
+    const Vec3<P> x = spread<P>(own.x, own.y, own.z), v = spread<P>(own.vx, own.vy, own.vz);
+    const P rho(own.b);
+    P ux(0.0), uy(0.0), uz(0.0);
+    const int row = i - in.begin;
+    for (int k = in.start[row]; k < in.start[row + 1]; k += 4) {
+      const int* const j = in.neighbour + k;
+      const Four<P> other = gather<P>(in.others, j);
+      const Vec3<P> d = x - other.x, u = other.v - v;
+      const P weight = xsph_weight(kernel.value(sqrt(dot(d, d))), rho, other.b);
+      const P x_ = weight * u.x, y_ = weight * u.y, z_ = weight * u.z;
+      ux += x_, uy += y_, uz += z_;
+      scatter(in.shift, j, -x_, -y_, -z_, P(0.0));
+    }
+    Quad& q = in.shift[i];
+    q = {q.x + total(ux), q.y + total(uy), q.z + total(uz), q.w};
+  }
+  return 0.0;
+}
+
+/// Sums of Shepard's filter over fluid pairs without the particles themselves, `sum`: W and W/rho. b: rho.
+template <class P, class Kernel>
+double shepard_pairs(const LoopArguments& in) {
+  const Kernel kernel(in.dimension, in.h);
+  for (int i = in.begin; i < in.end; ++i) {
+    const Record& own = in.own[i];
+    const Vec3<P> x = spread<P>(own.x, own.y, own.z);
+    const P rho(own.b);
+    P weight(0.0), volume(0.0);
+    const int row = i - in.begin;
+    for (int k = in.start[row]; k < in.start[row + 1]; k += 4) {
+      const int* const j = in.neighbour + k;
+      const Four<P> other = gather<P>(in.others, j);
+      const Vec3<P> d = x - other.x;
+      const P w = kernel.value(sqrt(dot(d, d)));
+      const ShepardTerms<P> forth = shepard_terms(w, other.b), back = shepard_terms(w, rho);
+      weight += forth.weight, volume += forth.volume;
+      scatter(in.sum, j, back.weight, back.volume, P(0.0), P(0.0));
+    }
+    Quad& q = in.sum[i];
+    q = {q.x + total(weight), q.y + total(volume), q.z, q.w};
+  }
+  return 0.0;
+}
+
 /// Sums of WallSums over the fluid around solid particles; fluid: a: p/rho^2, b: rho. `sum`: arm and weight; `rate`: pressure.
 template <class P, class Kernel>
 double wall_sums(const LoopArguments& in) {
@@ -256,6 +308,7 @@ struct Loops {
   Loop density_pairs[2][2], density_across[2][2];  ///< [kernel][with shifting]
   Loop force_pairs[2], force_across[2][2];         ///< [kernel][slip]
   Loop wall_sums[2];
+  Loop xsph_pairs[2], shepard_pairs[2];
 };
 
 template <class P>
@@ -267,7 +320,9 @@ constexpr Loops loops_of() {
           {{density_across<P, W, false>, density_across<P, W, true>}, {density_across<P, C, false>, density_across<P, C, true>}},
           {force_pairs<P, W>, force_pairs<P, C>},
           {{force_across<P, W, false>, force_across<P, W, true>}, {force_across<P, C, false>, force_across<P, C, true>}},
-          {wall_sums<P, W>, wall_sums<P, C>}};
+          {wall_sums<P, W>, wall_sums<P, C>},
+          {xsph_pairs<P, W>, xsph_pairs<P, C>},
+          {shepard_pairs<P, W>, shepard_pairs<P, C>}};
 }
 
 /// Those that every processor runs.

@@ -32,11 +32,16 @@ class Passes {
     if (dt > 0.0) {
       densities(scene, dt);
       images.send_densities(scene);
+      if (shepard_is_due(scene.settings.shepard, scene.step)) {
+        filter(scene);
+        images.send_densities(scene);
+      }
       pressures(scene, scene.fluid.size());
     }
     walls(scene);
     images.send_walls(scene);
     forces(scene, dt);
+    if (scene.settings.xsph.on() && dt > 0.0) smooth_drift(scene, dt);
     if (scene.settings.contact.on()) repel(scene);
     push_bodies(scene);
     const Settings& s = scene.settings;
@@ -79,6 +84,41 @@ class Passes {
         const Quad& q = fluid.shift_sum[i];
         fluid.shift[i] = shift(s.shifting, s.dimension, s.h(), s.spacing, dt, fluid.velocity[i], {q.x, q.y, q.z}, q.w);
       }
+    });
+  }
+
+  /// Shepard's filter of the fluid's densities. The compression energy that it takes counts as lost by diffusion.
+  void filter(Scene& scene) {
+    const Settings& s = scene.settings;
+    FluidParticles& fluid = scene.fluid;
+    scene.each(fluid.with_images(), [&](int i) {
+      fluid.records[i] = force_record(fluid.position[i], fluid.velocity[i], fluid.density[i], 0.0);
+      fluid.sum[i] = {};
+    });
+    pairs(scene, loops_->shepard_pairs[kernel(scene)]);
+    const double own = with_kernel(s, [](const auto& kernel) { return kernel.value(0.0); });
+    double taken = 0.0;
+    for (int i = 0; i < fluid.size(); ++i) {
+      const ShepardTerms<double> self = shepard_terms(own, fluid.density[i]);
+      const double rho = shepard_density(fluid.sum[i].x + self.weight, fluid.sum[i].y + self.volume);
+      taken += s.state.energy(fluid.density[i]) - s.state.energy(rho);
+      fluid.density[i] = rho;
+      fluid.pressure[i] = s.state.pressure(rho);
+    }
+    scene.lost.diffusive += s.mass() * taken;
+  }
+
+  /// XSPH: adds to the shifts. Records are those of the forces.
+  void smooth_drift(Scene& scene, double dt) {
+    const Settings& s = scene.settings;
+    FluidParticles& fluid = scene.fluid;
+    scene.each(fluid.with_images(), [&](int i) { fluid.shift_sum[i] = {}; });
+    pairs(scene, loops_->xsph_pairs[kernel(scene)]);
+    const double factor = dt * s.xsph.epsilon * s.mass();
+    scene.each(fluid.size(), [&](int i) {
+      const Quad& q = fluid.shift_sum[i];
+      const Vector drift = factor * Vector{q.x, q.y, q.z};
+      fluid.shift[i] = scene.shifts() ? fluid.shift[i] + drift : drift;
     });
   }
 

@@ -19,7 +19,7 @@ struct FluidParticles {
   std::vector<double> density, pressure;   ///< kg/m^3, Pa
   std::vector<Record> records;             ///< and one far away, as with the sums
   std::vector<double> rate;                ///< of density, kg/m^3/s
-  std::vector<Quad> sum, shift_sum;        ///< accelerations but for gravity, m/s^2; of shifting
+  std::vector<Quad> sum, shift_sum;        ///< accelerations but for gravity, m/s^2; of shifting, of XSPH
   // Of its own particles.
   std::vector<int> id;                      ///< number as they were given
   std::vector<Vector> acceleration, shift;  ///< m/s^2, m
@@ -37,6 +37,7 @@ struct Scene {
   std::vector<Body> bodies;
   Slits slits{};
   Energies lost{};  ///< losses and work so far
+  long step = 0;    ///< number of the last step, or of that under way, from 1 on
 
   bool shifts() const { return settings.shifting.coefficient > 0.0; }
   /// After a search: room for records and sums. far (m): a place beyond the reach of all particles.
@@ -45,7 +46,7 @@ struct Scene {
     fluid.records.resize(n);
     fluid.rate.resize(n);
     fluid.sum.resize(n);
-    if (shifts()) fluid.shift_sum.resize(n);
+    if (settings.displaces()) fluid.shift_sum.resize(n);
     fluid.records.back() = far_record(far);
     for (Solids& set : solids) {
       set.resize();

@@ -13,6 +13,7 @@
 #include "state.hpp"
 #include "vector.hpp"
 #include "wall.hpp"
+#include "xsph.hpp"
 
 namespace dembark::sph {
 
@@ -32,8 +33,12 @@ struct Settings {
   double skin = 0.2;           ///< over h: neighbours are searched anew when particles have moved half of it
   int threads = 1;
   double slit_pressure = 1.0;  ///< xi of the films in slits, 0 ... 1
+  Xsph xsph{};
+  int shepard = 0;  ///< steps from one filter of density to the next, 0: none
 
   double h() const { return smoothing * spacing; }
+  /// Whether particles are displaced beyond what their velocities do.
+  bool displaces() const { return shifting.coefficient > 0.0 || xsph.on(); }
   /// Of a particle, kg (in the plane kg/m).
   double mass() const { return state.density * std::pow(spacing, dimension); }
   /// Largest stable time step (s) of sound: the highest frequency of the lattice is below 2.2 c_0/h, and 2 over it is the limit of the
@@ -67,7 +72,9 @@ struct Settings {
                                                 {"contact_exponent", contact.exponent != other.contact.exponent},
                                                 {"skin", skin != other.skin},
                                                 {"threads", threads != other.threads},
-                                                {"slit_pressure", slit_pressure != other.slit_pressure}};
+                                                {"slit_pressure", slit_pressure != other.slit_pressure},
+                                                {"xsph", xsph.epsilon != other.xsph.epsilon},
+                                                {"shepard", shepard != other.shepard}};
     const auto found = std::find_if(std::begin(all), std::end(all), [](const auto& one) { return one.second; });
     return found == std::end(all) ? nullptr : found->first;
   }
@@ -85,6 +92,8 @@ struct Settings {
     if (const char* const wrong = contact.error()) return wrong;
     if (!(skin > 0.0 && skin <= 2.0)) return "skin (over h) must be > 0 and at most 2";
     if (!(slit_pressure >= 0.0 && slit_pressure <= 1.0)) return "slit_pressure must be between 0 and 1";
+    if (const char* const wrong = xsph.error()) return wrong;
+    if (shepard < 0) return "shepard (steps from one filter to the next) must be 0 or more";
     if (threads < 1) return "threads must be 1 or more";
     return nullptr;
   }

@@ -94,17 +94,17 @@ class Solver {
     check_speed();
     for (Solids& set : scene_.solids) set.follow(scene_.bodies);
     if (neighbours_.outdated(scene_, scene_.settings.skin * scene_.settings.h())) search();
+    ++scene_.step;
     compute(dt);
     scene_.each(fluid.size(), [&](int i) { fluid.velocity[i] += (0.5 * dt) * fluid.acceleration[i]; });
     power = 0.0;
     for (Body& b : scene_.bodies) power += b.second_half(dt);
     scene_.lost.work += 0.5 * dt * power;
     time_ += dt;
-    ++steps_;
   }
 
   double time() const { return time_; }
-  long steps() const { return steps_; }
+  long steps() const { return scene_.step; }
   /// How often neighbours were searched.
   long searches() const { return neighbours_.builds(); }
   /// Fluid, in the order of the cells (`id` has its numbers), walls and bodies.
@@ -230,16 +230,15 @@ class Solver {
     }
     Energies& e = scene_.lost;
     value(e.viscous), value(e.diffusive), value(e.boundary), value(e.work), value(e.contact);
-    double steps = double(steps_);
+    double steps = double(scene_.step);
     value(time_), value(steps);
-    steps_ = long(steps);
+    scene_.step = long(steps);
   }
 
   Scene scene_;
   Neighbours neighbours_;
   Passes passes_;
   double time_ = 0.0;
-  long steps_ = 0;
   bool begun_ = false;
   bool judged_ = false;  // whether particles overlap that were given
 };

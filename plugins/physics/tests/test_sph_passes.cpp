@@ -14,14 +14,15 @@ namespace {
 
 /// What processes send to each other, by the numbers of the particles in the scene of one process.
 struct Sent {
-  std::vector<double> density, wall_density, wall_pressure;
+  std::vector<std::vector<double>> densities;  // of the fluid, each time that they are sent
+  std::vector<double> wall_density, wall_pressure;
   std::vector<Vector> met;
 };
 
 struct Recorder {
   Sent* sent;
   void send_densities(Scene& scene) const {
-    sent->density = scene.fluid.density;
+    sent->densities.push_back(scene.fluid.density);
     sent->wall_density = scene.solids[0].density;
   }
   void send_walls(Scene& scene) const {
@@ -40,8 +41,9 @@ struct Process {
 struct Receiver {
   const Sent* sent;
   const Process* own;
+  mutable std::size_t times = 0;
   void send_densities(Scene& scene) const {
-    receive(sent->density, own->fluid, scene.fluid.size(), scene.fluid.density);
+    receive(sent->densities[times++], own->fluid, scene.fluid.size(), scene.fluid.density);
     receive(sent->wall_density, own->solids[0], scene.solids[0].size(), scene.solids[0].density);
   }
   void send_walls(Scene& scene) const {
@@ -166,6 +168,8 @@ TEST_CASE("SPH passes: two processes that share the particles get what one gets"
       s.boundary = boundary;
       s.no_slip = true;
       s.shifting = {2.0};
+      s.xsph = {0.5};
+      s.shepard = 1;
       if (potential) s.contact = {1e5, 2};
       const Scene scene = tank(s);
       const double dt = 0.5 * s.longest_step(), cut = 0.43;
@@ -173,13 +177,16 @@ TEST_CASE("SPH passes: two processes that share the particles get what one gets"
       Passes passes(s, portable_loops());
       passes.pressures(one.scene);
       Sent sent;
+      one.scene.step = 1;
       passes.compute(one.scene, dt, Recorder{&sent});
+      CHECK(sent.densities.size() == 2);
       Energies lost;
       Vector force{}, torque{};
       for (const bool left : {true, false}) {
         Process half = process(scene, [&](const Vector& x) { return (x.x < cut) == left; });
         REQUIRE(half.scene.fluid.size() < one.scene.fluid.size());
         passes.pressures(half.scene);
+        half.scene.step = 1;
         passes.compute(half.scene, dt, Receiver{&sent, &half});
         const FluidParticles &found = half.scene.fluid, &due = one.scene.fluid;
         for (int k = 0; k < found.size(); ++k) {

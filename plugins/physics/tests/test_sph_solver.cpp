@@ -264,6 +264,137 @@ TEST_CASE("SPH solver: a state goes on bit for bit, on any number of threads", "
   CHECK(one.searches() > 1);
 }
 
+namespace {
+
+/// In the order in which it was given, of each particle of the fluid.
+template <class T>
+std::vector<T> in_order(const FluidParticles& fluid, const std::vector<T>& values) {
+  std::vector<T> out(fluid.id.size());
+  for (std::size_t i = 0; i < out.size(); ++i) out[std::size_t(fluid.id[i])] = values[i];
+  return out;
+}
+
+/// Fluid without walls, gravity and pressure, which moves at random.
+Solver cloud(int dimension, double epsilon, int shepard) {
+  Settings s = plane_settings(0.1, 20.0);
+  s.dimension = dimension;
+  s.kernel = KernelName::cubic_spline;
+  s.smoothing = 1.5;
+  s.alpha = s.delta = 0.0;
+  s.xsph = {epsilon};
+  s.shepard = shepard;
+  const std::vector<Vector> x = lattice(7, 6, dimension == 3 ? 5 : 0, 0.1);
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> u(900.0, 950.0);
+  std::vector<double> rho(x.size());
+  for (double& each : rho) each = u(random);
+  return Solver(s, x, rho, random_velocities(x.size(), dimension == 2, 1.0));
+}
+
+}  // namespace
+
+TEST_CASE("SPH solver: XSPH is its sum, and moves the centre of mass as the momentum does", "[sph]") {
+  for (const int dimension : {2, 3}) {
+    const double dt = 1e-3, epsilon = 0.5;
+    Solver with = cloud(dimension, epsilon, 0), without = cloud(dimension, 0.0, 0);
+    with.step(dt), without.step(dt);
+    const FluidParticles& fluid = without.scene().fluid;
+    const CubicSpline kernel(dimension, 0.15);
+    const std::vector<Vector> x = in_order(fluid, fluid.position), v = in_order(fluid, fluid.velocity);
+    const std::vector<double> rho = in_order(fluid, fluid.density);
+    std::vector<Vector> due = x;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      due[i] += dt * v[i];
+      for (std::size_t j = 0; j < x.size(); ++j)
+        due[i] +=
+            dt * epsilon * without.scene().settings.mass() / (0.5 * (rho[i] + rho[j])) * kernel.value(norm(x[i] - x[j])) * (v[j] - v[i]);
+    }
+    with.step(dt);
+    const FluidParticles& after = with.scene().fluid;
+    const std::vector<Vector> found = in_order(after, after.position), speed = in_order(after, after.velocity);
+    Vector middle{}, momentum{};
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      CHECK(norm(found[i] - due[i]) < 1e-13);
+      CHECK(norm(speed[i] - v[i]) < 1e-13);
+      middle += found[i] - x[i];
+      momentum += v[i];
+    }
+    CHECK(norm(middle - dt * momentum) < 1e-13 * double(x.size()));
+  }
+}
+
+TEST_CASE("SPH solver: Shepard's filter is its mean, in the steps in which it is due", "[sph]") {
+  for (const int dimension : {2, 3}) {
+    const double dt = 1e-3;
+    Solver with = cloud(dimension, 0.0, 2), without = cloud(dimension, 0.0, 0);
+    with.step(dt), without.step(dt);
+    CHECK(with.state() == without.state());
+    with.step(dt), without.step(dt);
+    const FluidParticles &fluid = without.scene().fluid, &filtered = with.scene().fluid;
+    const CubicSpline kernel(dimension, 0.15);
+    double changed = 0.0;
+    for (int i = 0; i < fluid.size(); ++i) {
+      double weight = 0.0, volume = 0.0;
+      for (int j = 0; j < fluid.size(); ++j) {
+        const double w = kernel.value(norm(fluid.position[i] - fluid.position[j]));
+        weight += w, volume += w / fluid.density[j];
+      }
+      CHECK_THAT(filtered.density[i], WithinRel(weight / volume, 1e-12));
+      changed = std::max(changed, std::abs(filtered.density[i] - fluid.density[i]));
+    }
+    CHECK(changed > 1.0);
+  }
+}
+
+TEST_CASE("SPH solver: what Shepard's filter takes of the compression is in the ledger", "[sph]") {
+  Settings s = plane_settings(0.02, 28.0);
+  s.gravity = {0.0, -9.81, 0.0};
+  s.alpha = 0.1;
+  s.delta = 0.0;
+  s.shepard = 20;
+  s.kernel = KernelName::cubic_spline;
+  const std::vector<Vector> x = lattice(8, 10, 0, 0.02);
+  Solver solver(s, x, std::vector<double>(x.size(), 1000.0), std::vector<Vector>(x.size()));
+  solver.add(Body{}, tank_walls(14, 10, 0.02));
+  solver.prepare();
+  const double before = solver.energies().stored();
+  while (solver.time() < 0.1) solver.step(1e-4);
+  const Energies e = solver.energies();
+  CHECK(e.diffusive > 0.0);
+  CHECK(std::abs(e.stored() + e.viscous + e.diffusive + e.boundary - before) < 0.01 * e.kinetic);
+}
+
+TEST_CASE("SPH solver: a body of unequal moments, XSPH and filter go on from a state bit for bit, on any number of threads", "[sph]") {
+  const auto made = [](int threads) {
+    Settings s;
+    s.spacing = 0.1;
+    s.state.sound_speed = 20.0;
+    s.xsph = {0.5};
+    s.shepard = 7;
+    s.threads = threads;
+    std::vector<Vector> x, solid;
+    for (const Vector& p : lattice(7, 6, 6, 0.1)) (norm(p - Vector{0.3, 0.3, 0.3}) < 0.15 ? solid : x).push_back(p);
+    Solver solver(s, x, std::vector<double>(x.size(), 1002.0), random_velocities(x.size(), false, 1.0));
+    Body b;
+    b.free = true;
+    b.mass = 5.0;
+    b.inertia = {0.02, 0.03, 0.05};
+    b.position = {0.3, 0.3, 0.3};
+    b.spin = {0.1, 6.0, 0.2};
+    for (Vector& p : solid) p -= b.position;
+    solver.add(b, solid);
+    return solver;
+  };
+  Solver one = made(1), again = made(1), three = made(3);
+  for (int k = 0; k < 40; ++k) one.step(1e-3), three.step(1e-3);
+  CHECK(one.state() == three.state());
+  again.restore(one.state());
+  for (int k = 0; k < 40; ++k) one.step(1e-3), again.step(1e-3);
+  CHECK(one.state() == again.state());
+  const Body& b = one.scene().bodies[0];
+  CHECK(norm(b.orientation({1.0, 0.0, 0.0}) - Vector{1.0, 0.0, 0.0}) > 0.1);
+}
+
 TEST_CASE("SPH bodies: free fall, a torque-free top, points that turn", "[sph]") {
   Body top;
   top.free = true;

@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "catch.hpp"
@@ -7,9 +9,11 @@
 #include "dembark/sph/contact_potential.hpp"
 #include "dembark/sph/kernels.hpp"
 #include "dembark/sph/pair_terms.hpp"
+#include "dembark/sph/shepard.hpp"
 #include "dembark/sph/shifting.hpp"
 #include "dembark/sph/state.hpp"
 #include "dembark/sph/wall.hpp"
+#include "dembark/sph/xsph.hpp"
 
 using namespace dembark;
 using namespace dembark::sph;
@@ -182,4 +186,45 @@ TEST_CASE("SPH contact potential: its force is the gradient of its energy", "[sp
       CHECK_THAT(contact_factor(law, kernel, r, volumes, w0) * r, WithinRel(fall, 1e-5));
     }
   }
+}
+
+TEST_CASE("SPH XSPH: two particles exchange as much momentum of drift", "[sph]") {
+  const CubicSpline kernel(3, 0.013);
+  for (const double r : {0.004, 0.012, 0.02}) {
+    const double w = kernel.value(r), forth = xsph_weight(w, 1010.0, 990.0);
+    CHECK(forth == xsph_weight(w, 990.0, 1010.0));
+    CHECK_THAT(forth, WithinRel(w / 1000.0, 1e-12));
+  }
+  CHECK(std::string(Xsph{1.1}.error()) == "xsph must be between 0 and 1");
+  CHECK(Xsph{NAN}.error() != nullptr);
+}
+
+TEST_CASE("SPH Shepard: its weights sum to one, a uniform density stays, and none leaves the range around it", "[sph]") {
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  each_kernel([&](const auto& kernel, int dimension, double h) {
+    for (const double uniform : {0.0, 1003.0}) {
+      std::vector<double> w{kernel.value(0.0)}, rho{1000.0};
+      for (int k = 0; k < 30; ++k) {
+        const Vector d{2.0 * h * u(random), 2.0 * h * u(random), dimension == 3 ? 2.0 * h * u(random) : 0.0};
+        w.push_back(kernel.value(norm(d)));
+        rho.push_back(1000.0 + 20.0 * u(random));
+      }
+      if (uniform > 0.0) rho.assign(rho.size(), uniform);
+      double weight = 0.0, volume = 0.0, least = 1e9, most = 0.0, unity = 0.0;
+      for (std::size_t k = 0; k < w.size(); ++k) {
+        const ShepardTerms<double> terms = shepard_terms(w[k], rho[k]);
+        weight += terms.weight, volume += terms.volume;
+        if (w[k] > 0.0) least = std::min(least, rho[k]), most = std::max(most, rho[k]);
+      }
+      for (std::size_t k = 0; k < w.size(); ++k) unity += shepard_terms(w[k], rho[k]).volume / volume;
+      CHECK_THAT(unity, WithinRel(1.0, 1e-12));
+      const double found = shepard_density(weight, volume);
+      if (uniform > 0.0) CHECK_THAT(found, WithinRel(uniform, 1e-14));
+      else CHECK((found > least && found < most));
+    }
+  });
+  CHECK(shepard_is_due(30, 60));
+  CHECK(!shepard_is_due(30, 61));
+  CHECK(!shepard_is_due(0, 60));
 }

@@ -253,6 +253,8 @@ class SphFluid:
     gamma, tension : of the equation of state; with tension pressures may be negative, for closed vessels
     no_slip : viscosity acts at walls and bodies, too
     shifting : coefficient, 2 is usual; 0 = none
+    xsph : epsilon, 0 ... 1: how far particles drift with the mean velocity around them; 0.5 is usual, 0 = none
+    shepard : steps from one filter of density to the next; 30 is usual, 0 = none
     contact_stiffness, contact_exponent : contact potential (Pa/m^d) between fluid and free bodies in the place of pressure; 0 = none
     threads : the same bits come from any number
     skin : over h, how far beyond the support neighbours are searched
@@ -271,8 +273,8 @@ class SphFluid:
     def __init__(self, positions: ArrayLike, *, spacing: float, sound_speed: float, density: float = 1000.0,
                  gravity: ArrayLike | None = None, velocity: ArrayLike = 0.0, pressure: ArrayLike = 0.0, smoothing: float = 1.3,
                  kernel: str = "wendland_c2", alpha: float = 0.02, delta: float = 0.1, gamma: float = 7.0, tension: bool = False,
-                 boundary: str = "extrapolated", no_slip: bool = False, shifting: float = 0.0, contact_stiffness: float = 0.0,
-                 contact_exponent: int = 4, threads: int = 1, skin: float = 0.2, slit_pressure: float = 1.0,
+                 boundary: str = "extrapolated", no_slip: bool = False, shifting: float = 0.0, xsph: float = 0.0, shepard: int = 0,
+                 contact_stiffness: float = 0.0, contact_exponent: int = 4, threads: int = 1, skin: float = 0.2, slit_pressure: float = 1.0,
                  instruction_set: str = "best") -> None:
         points = _points("positions", positions)
         n, self._dimension = len(points), np.shape(positions)[1]
@@ -294,7 +296,7 @@ class SphFluid:
         self._solver = _physics.SphSolver(
             points, densities, velocities, self._dimension, spacing, smoothing, kernel, density, sound_speed, gamma, tension, alpha, delta,
             np.append(weight, 0.0)[:3].tolist(), boundary, no_slip, shifting, contact_stiffness, contact_exponent, skin, threads,
-            slit_pressure, instruction_set)
+            slit_pressure, xsph, shepard, instruction_set)
 
     def add_wall(self, points: ArrayLike) -> SphBody:
         """A wall of particles at `points` (m, (k, d)), at rest until its `set_motion`; torques and turns are about the origin."""

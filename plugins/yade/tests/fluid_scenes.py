@@ -62,7 +62,7 @@ def falling_plane():
 
 
 def falling_space():
-    fluid = pool((0, 0, -G), (0, 0, 0), (0.2, 0.2, 0.1), 0.3)
+    fluid = pool((0, 0, -G), (0, 0, 0), (0.2, 0.2, 0.1), 0.3, xsph=0.5, shepard=20)
     body = block((0.09, 0.11, 0.23), 0.4096, (4.4e-4, 4.4e-4, 4.4e-4), (0, 0.1, -1.0 + 0.5 * STEP * G), (1.0, 2.0, 3.0))
     fluid.addBody(body, dembark.lattice((0.05, 0.07, 0.19), (0.13, 0.15, 0.27), DX))
     advance(401)
@@ -123,7 +123,7 @@ def saved():
     """
     found = {}
     for ending in ("xml", "yade.gz", "bin"):
-        fluid = pool((0, -G, 0), (0, 0), (0.4, 0.12), 0.4, substeps=3)
+        fluid = pool((0, -G, 0), (0, 0), (0.4, 0.12), 0.4, substeps=3, xsph=0.5, shepard=7)
         O.dt = STEP / 3
         body = block((0.19, 0.2, 0), 8.0, (0.0133, 0.0133, 0.0133), (0.2, -3.0, 0), (0, 0, 2.0), plane=True)
         fluid.addBody(body, dembark.lattice((0.14, 0.15), (0.24, 0.25), DX))

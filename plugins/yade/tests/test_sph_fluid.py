@@ -52,7 +52,7 @@ def test_a_block_falls_in_the_plane_as_in_the_solver(found):
 
 
 def test_a_cube_falls_in_space_as_in_the_solver(found):
-    water = pool([0, 0, 0], [0.2, 0.2, 0.1], 0.3)
+    water = pool([0, 0, 0], [0.2, 0.2, 0.1], 0.3, xsph=0.5, shepard=20)
     body = water.add_body(lattice([0.05, 0.07, 0.19], [0.13, 0.15, 0.27], DX), mass=0.4096, inertia=[4.4e-4] * 3, centre=[0.09, 0.11, 0.23])
     body.set_motion([0.0, 0.1, -1.0], [1.0, 2.0, 3.0])
     assert_same(water, body, found["falling_space"], 400)

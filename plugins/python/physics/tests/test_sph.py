@@ -46,7 +46,8 @@ def splash(**options):
     return water, water.add_wall(tank_walls([0, 0], [0.5, 0.4], DX))
 
 
-@pytest.mark.parametrize("options", [{}, {"kernel": "cubic_spline", "shifting": 2.0, "no_slip": True}, {"boundary": "dynamic"}])
+@pytest.mark.parametrize("options", [{}, {"kernel": "cubic_spline", "shifting": 2.0, "no_slip": True}, {"boundary": "dynamic"},
+                                     {"xsph": 0.5, "shepard": 10}])
 def test_every_processor_and_number_of_threads_gets_the_same_bits(options):
     states = []
     for more in ({}, {"instruction_set": "portable"}, {"threads": 2}):
@@ -206,6 +207,8 @@ def test_space():
     ({"alpha": np.nan}, "alpha must be between 0 and 1"),
     ({"smoothing": 9.0}, r"smoothing \(h over the spacing\) must be between 0.8 and 3"),
     ({"threads": 0}, "threads must be 1 or more"),
+    ({"xsph": 1.5}, "xsph must be between 0 and 1"),
+    ({"shepard": -1}, r"shepard \(steps from one filter to the next\) must be 0 or more"),
     ({"contact_exponent": 0}, "contact_exponent must be 1 or more"),
 ])
 def test_wrong_input_gets_one_line(change, line):
@@ -257,12 +260,15 @@ def test_what_is_put_into_the_fluid_is_told():
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**31), st.sampled_from([2, 3]), st.sampled_from(SPH_KERNELS))
 def test_momentum_of_a_free_cloud_is_conserved(seed, dimension, kernel):
+    """With XSPH, too, which moves the centre of mass as the momentum does."""
     random = np.random.default_rng(seed)
     points = lattice([0] * dimension, [0.1] * dimension, DX) + random.uniform(-0.2, 0.2, (5**dimension, dimension)) * DX
     cloud = SphFluid(points, spacing=DX, sound_speed=20.0, alpha=0.3, kernel=kernel, velocity=random.uniform(-1, 1, points.shape),
-                     pressure=random.uniform(0.0, 2e4, len(points)))
+                     pressure=random.uniform(0.0, 2e4, len(points)), xsph=0.5, shepard=5)
     before = cloud.velocities
     cloud.run(0.01)
+    middle = points.mean(axis=0) + 0.01 * before.mean(axis=0)
+    assert np.abs(cloud.positions.mean(axis=0) - middle).max() < 1e-13
     assert np.abs(cloud.velocities.sum(axis=0) - before.sum(axis=0)).max() < 1e-12 * np.abs(before).sum()
 
 
