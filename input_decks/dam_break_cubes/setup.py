@@ -34,7 +34,8 @@ def setup(p: Parameters) -> Setup:
     every = math.ceil(p.run_time / step / p.frames / p.rows)
     stride = every * p.rows
     places = cubes(p)
-    numbers = {name: getattr(p, name) for name in ("sound_speed", "cube_mass", "cube_inertia", "particle_mass", "grain_count")}
+    numbers = {name: getattr(p, name) for name in ("sound_speed", "cube_mass", "cube_inertia", "particle_mass", "sphere_radius",
+                                                   "grain_count")}
     made = {"stride": stride, "every": every, "cube_count": len(places), "layers": wall_layers(p), "prime_seed": prime(p.seed)}
     return Setup(stride * p.frames, step, None, {**numbers, **made},
                  tables={f"cube_{axis}": tuple(place[k] for place in places) for k, axis in enumerate("xyz")})

@@ -209,7 +209,10 @@ class CubesRecorder(_CaseRecorder):
             moving += state.mass * self._p.gravity * state.pos[2]
             poses += _pose(state, self._upright[number])
         for one in O.interactions:
-            # Fn is the spring's force; normalForce has the dashpot's, too.
-            if one.isReal:
+            if one.isReal and type(one.phys).__name__ == "MindlinPhys":
+                # kn is the slope of Hertz's force; that of shear follows the overlap and has no energy of its own.
+                springs += 4.0 / 15.0 * one.phys.kn * one.geom.penetrationDepth**2
+            elif one.isReal:
+                # Fn is the spring's force; normalForce has the dashpot's, too.
                 springs += 0.5 * (one.phys.Fn**2 / one.phys.kn + one.phys.shearForce.squaredNorm() / one.phys.ks)
         return [*(energies[name] for name in self.ENERGIES), moving, springs, *poses]
