@@ -23,7 +23,7 @@ TINY = {"spacing": 0.0375, "column_length": 0.4125, "column_height": 0.3, "dista
         # Half of this spacing is an eighth of a cube: too much for a film.
         "slit_pressure": 0.0, "lattice_noise": 0.0, "cube_noise": 0.0}
 SPHERES = {"contacts": "spheres", "edge_spheres": 7}
-# The scheme of Sarmakeeva et al. (2017), but for its smoothing length and friction. In this flume it would fill the gap before the cubes.
+# The scheme of Sarmakeeva et al. (2017), but for its friction and its h of 2.1 spacings, whose layer would be as thick as a cube here.
 SOURCE = SPHERES | {"coupling": "potential", "boundary": "dynamic", "kernel": "cubic_spline", "delta": 0.0, "xsph": 0.5, "shepard": 30}
 
 
