@@ -22,6 +22,7 @@ from dembark.validation.case.resolve import resolve
     ("drive_power", {"time_step_fraction": 0.3}, "lower time_step_fraction"),
     ("drive_power", {"cell_width": 0.015}, "must be at least 4 grain_diameter"),
     ("drive_power", {"motion": "circular"}, "shake up and down"), ("drive_power", {"motion_amplitude": 0.002}, "not motion_amplitude"),
+    ("silo", {"bridge_volume": 1e-3}, "a bridge is larger than the grains"), ("silo", {"surface_tension": 72.0}, "surface_tension"),
     ("liquid_exchange", {"liquid_share": "fraction", "liquid_share_factor": 1.5}, "liquid_share_factor"),
     ("log_pair", {"velocity_1": -1.0}, "velocity_1"), ("log_pair", {"offset": 0.2}, "offset"),
     ("log_pair", {"target": "wall", "velocity_1": -1.0}, "velocity_1"), ("log_pile", {"width": 0.3}, "width"),
