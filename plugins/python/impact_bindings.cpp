@@ -42,7 +42,7 @@ Result table(const std::vector<T>& list, std::size_t columns) {
 
 /// What a run stores, a sample each.
 struct History {
-  std::vector<double> time, position, velocity, spin, report, column;
+  std::vector<double> time, position, velocity, spin, orientation, report, column;
 };
 
 void sample(Scene& scene, const StepReport& r, const std::vector<std::int64_t>& left, const std::vector<std::int64_t>& right, History& h) {
@@ -50,6 +50,7 @@ void sample(Scene& scene, const StepReport& r, const std::vector<std::int64_t>& 
   for (const Body& b : scene.bodies()) append(h.position, b.position);
   for (const auto& v : scene.velocity()) append(h.velocity, v);
   for (const auto& w : scene.spin()) append(h.spin, w);
+  for (const Quaternion& q : scene.orientation()) append(h.orientation, to_numbers(q));
   append(h.report, to_numbers(r));
   h.report.push_back(scene.kinetic_energy_of_half_step());
   const auto& contacts = scene.system().contacts();
@@ -64,10 +65,19 @@ void sample(Scene& scene, const StepReport& r, const std::vector<std::int64_t>& 
 }  // namespace
 
 void bind_impact(nb::module_& m) {
+  // About the axis and across it, a row each.
+  m.def("capsule_inertia", [](Array mass, Array radius, Array length) {
+    std::vector<double> out;
+    for (std::size_t i = 0; i < mass.shape(0); ++i) {
+      const CapsuleInertia inertia = capsule_inertia(mass.data()[i], radius.data()[i], length.data()[i]);
+      out.insert(out.end(), {inertia.axial, inertia.across});
+    }
+    return numpy(out, {mass.shape(0), 2});
+  });
   nb::class_<Scene>(m, "ImpactScene")
       .def("__init__",
            [](Scene* self, double dt, double theta, int sweeps, const std::string& method, Table materials, Table pairs, Table bodies,
-              Table planes, Table drums, double reach, bool row) {
+              Table planes, Table drums, double reach, bool row, double period) {
              Settings settings;
              settings.dt = dt;
              settings.theta = theta;
@@ -75,9 +85,13 @@ void bind_impact(nb::module_& m) {
              settings.lcp.method = lcp_method(method);
              settings.materials = rows<Material>(materials);
              settings.pairs = rows<ImpactPairLaw>(pairs);
-             Scene* scene = new (self) Scene(settings, rows<Body>(bodies));
+             // Rows of capsules are longer than those of bodies without a length.
+             const bool capsules = bodies.shape(1) > to_numbers(Body()).size();
+             Scene* scene = capsules ? new (self) Scene(settings, rows<Capsule>(bodies)) : new (self) Scene(settings, rows<Body>(bodies));
              scene->reach = reach;
              scene->row = row;
+             scene->around.pairs.box.periodic[2] = period > 0.0;
+             scene->around.pairs.box.length.z = period;
              scene->around.planes = rows<Plane>(planes);
              scene->around.drums = rows<Drum>(drums);
            })
@@ -94,10 +108,15 @@ void bind_impact(nb::module_& m) {
                if (i < steps) scene.advance();
                if (i % 4096 == 4095 && PyErr_CheckSignals() != 0) throw nb::python_error();
              }
-             const std::size_t samples = h.time.size(), n = scene.bodies().size();
+             const std::size_t samples = h.time.size(), n = scene.bodies().size(), oriented = scene.orientation().size();
              return nb::make_tuple(numpy(h.time, {samples}), numpy(h.position, {samples, n, 3}), numpy(h.velocity, {samples, n, 3}),
-                                   numpy(h.spin, {samples, n, 3}), numpy(h.report, {samples, 14}), numpy(h.column, {samples, left.size()}),
-                                   table(impacts, 17));
+                                   numpy(h.spin, {samples, n, 3}), numpy(h.orientation, {samples, oriented, 4}),
+                                   numpy(h.report, {samples, 14}), numpy(h.column, {samples, left.size()}), table(impacts, 17));
+           })
+      .def("worst_overlap",
+           [](Scene& scene) {
+             const auto worst = scene.worst_overlap();
+             return nb::make_tuple(worst.first.first, worst.first.second, worst.second);
            })
       .def("contacts", [](const Scene& scene) { return table(scene.system().contacts(), 14); })
       .def("kinetic_energy_of_half_step", &Scene::kinetic_energy_of_half_step)

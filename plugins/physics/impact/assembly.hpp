@@ -2,7 +2,8 @@
 //
 //   A = diag(1 / (s + c/tau)) + h tau^2 G^T M'^-1 G,
 //
-// s the stiffness of both springs in series, M' the response masses, G the normals.
+// s the stiffness of both springs in series, M' the response masses, G the normals; where contacts act off the centres of bodies, the
+// moments of the normals too, with the inertia of the bodies in M'.
 #pragma once
 
 #include <Eigen/SparseCore>
@@ -34,13 +35,17 @@ struct Row : Contact {
   int memory = -1;                         ///< index into what is remembered, or -1
   const ContactHistory* before = nullptr;  ///< what is known of it, maybe by another name; see history.hpp
   const ImpactPairLaw* law = nullptr;
-  double stiffness = 0.0;           ///< s, N/m, both springs in series
-  double viscous = 0.0;             ///< c / tau, N/m
-  double compliance = 0.0;          ///< 1 / (s + c/tau), m/N
-  double arm_a = 0.0, arm_b = 0.0;  ///< m, from the centres to the contact
-  double radius = 0.0;              ///< m, R* = r_a r_b / (r_a + r_b), where friction asks for it
-  Vec3<double> point{};             ///< m, of contact
+  double stiffness = 0.0;               ///< s, N/m, both springs in series
+  double viscous = 0.0;                 ///< c / tau, N/m
+  double compliance = 0.0;              ///< 1 / (s + c/tau), m/N
+  double arm_a = 0.0, arm_b = 0.0;      ///< m, from the centres to the contact
+  double radius = 0.0;                  ///< m, R* = r_a r_b / (r_a + r_b), where friction asks for it
+  Vec3<double> point{};                 ///< m, of contact
+  Vec3<double> moment_a{}, moment_b{};  ///< m, of the normal about the centres of the bodies; contacts with a lever only
 };
+
+/// k, N/m, of the friction spring.
+inline double tangential_stiffness(const Row& row) { return row.law->tangential_stiffness_ratio * row.stiffness; }
 
 class Assembly {
  public:
@@ -77,8 +82,17 @@ class Assembly {
 
   void clear() { rows_.clear(); }
 
-  /// Makes A. bodies: with 1/m' as `inverse` (1/kg); scale: h tau^2 (s^2). Rows meet in the bodies that they share, and each body keeps
-  /// the last row so far, which leads to those before it.
+  /// Moment of the normal about the centre of one of the bodies (m); side: 0, a, or 1, b.
+  static const Vec3<double>& moment(const Row& r, int side) { return side ? r.moment_b : r.moment_a; }
+  /// What the rotation of the bodies adds to the response of a contact to its own force (1/kg).
+  template <class Sums>
+  static double turning(const Row& r, const std::vector<Sums>& bodies) {
+    const double a = bodies[std::size_t(r.a)].spin_inverse * dot(r.moment_a, r.moment_a);
+    return r.b < 0 ? a : a + bodies[std::size_t(r.b)].spin_inverse * dot(r.moment_b, r.moment_b);
+  }
+
+  /// Makes A. bodies: with 1/m' as `inverse` (1/kg), 1/I as `spin_inverse`; scale: h tau^2 (s^2). Rows meet in the bodies that they share,
+  /// and each body keeps the last row so far, which leads to those before it.
   template <class Sums>
   void assemble(const std::vector<Sums>& bodies, double scale) {
     const auto inverse = [&](int body) { return body >= 0 ? bodies[std::size_t(body)].inverse : 0.0; };
@@ -87,12 +101,14 @@ class Assembly {
     before_.resize(2 * rows_.size());
     for (int i = 0; i < int(rows_.size()); ++i) {
       const Row& r = rows_[std::size_t(i)];
-      entries_.emplace_back(i, i, r.compliance + scale * (inverse(r.a) + inverse(r.b)));
+      entries_.emplace_back(i, i, r.compliance + scale * (inverse(r.a) + inverse(r.b)) + (r.lever ? scale * turning(r, bodies) : 0.0));
       for (int side = 0; side < (r.b >= 0 ? 2 : 1); ++side) {
         const int body = side ? r.b : r.a;
         int& last = last_[std::size_t(body)];
         for (int other = last; other >= 0; other = before_[std::size_t(other)]) {  // two slots a row, for its two sides
-          const double entry = scale * inverse(body) * dot(r.normal, rows_[std::size_t(other / 2)].normal);
+          const Row& o = rows_[std::size_t(other / 2)];
+          double entry = scale * inverse(body) * dot(r.normal, o.normal);
+          if (r.lever && o.lever) entry += scale * bodies[std::size_t(body)].spin_inverse * dot(moment(r, side), moment(o, other % 2));
           const double value = other % 2 == side ? entry : -entry;
           entries_.emplace_back(i, other / 2, value);
           entries_.emplace_back(other / 2, i, value);
@@ -152,6 +168,7 @@ class Assembly {
     if (std::max(std::abs(c.key_a), std::abs(c.key_b)) > (std::int64_t(1) << 53)) refuse(c, "keys must stay below 2^53");
     if (!(std::isfinite(c.gap) && std::abs(dot(c.normal, c.normal) - 1.0) < unit_tolerance))
       refuse(c, "the gap must be finite and the normal a unit vector");
+    if (!(c.share > 0.0 && c.share <= 1.0)) refuse(c, "the share of the stiffness must be > 0 and <= 1");
   }
 
   void fill(const std::vector<Body>& bodies, const Contact& c, const Settings& settings, Row& r) {
@@ -160,6 +177,7 @@ class Assembly {
     if (turned(c)) {
       std::swap(r.a, r.b);
       std::swap(r.key_a, r.key_b);
+      std::swap(r.offset_a, r.offset_b);
       r.normal = -c.normal;
     }
     const bool wall = c.b < 0;
@@ -173,15 +191,20 @@ class Assembly {
     if (springs.wall != (wall ? c.wall_stiffness : 0.0))
       springs = springs_of(c, settings.materials[std::size_t(a.material)].stiffness,
                            wall ? c.wall_stiffness : settings.materials[std::size_t(side)].stiffness, *r.law, dt_);
-    r.stiffness = springs.stiffness;
-    r.viscous = springs.viscous;
-    r.compliance = springs.compliance;
+    r.stiffness = r.share * springs.stiffness;
+    r.viscous = r.share * springs.viscous;
+    r.compliance = springs.compliance / r.share;
     // The two lever arms add up to the distance of the centres, which keeps the angular momentum; each boundary gives way by its own
     // compliance.
     const double share = springs.share, other = wall ? 0.0 : bodies[r.b].radius;
     r.arm_a = a.radius + share * c.gap;
     r.arm_b = wall ? 0.0 : other + (1.0 - share) * c.gap;
     r.point = a.position - r.arm_a * r.normal;
+    if (r.lever) {
+      r.point += r.offset_a;
+      r.moment_a = cross(r.offset_a, r.normal);
+      r.moment_b = cross(r.offset_b, r.normal);
+    }
     if (r.law->friction.interface_shear_strength < unlimited_strength)
       r.radius = wall || a.radius == 0.0 ? a.radius : a.radius * other / (a.radius + other);
   }

@@ -24,10 +24,11 @@
 namespace dembark {
 namespace impact {
 
-/// Area (m^2) that the interface's shear strength counts on: as given, or the circle pi R* N / s of the springs' approach N / s.
+/// Area (m^2) that the interface's shear strength counts on: as given, or the circle pi R* N / s of the springs' approach N / s; a point of
+/// several has its share.
 inline double friction_area(const Row& row, double normal_force) {
-  if (row.law->contact_area > 0.0) return row.law->contact_area;
-  return pi * row.radius * normal_force / row.stiffness;
+  if (row.law->contact_area > 0.0) return row.share * row.law->contact_area;
+  return row.share * (pi * row.radius * normal_force / row.stiffness);
 }
 
 /// One sweep of one contact.
@@ -51,9 +52,6 @@ inline Vec3<double> friction_sweep(const Row& row, double normal_force, double r
   state.displacement = (force + (row.viscous / row.stiffness) * start) * -give;
   return force;
 }
-
-/// k, N/m, of the friction spring.
-inline double tangential_stiffness(const Row& row) { return row.law->tangential_stiffness_ratio * row.stiffness; }
 
 /// The friction forces of all contacts of a step.
 class FrictionForces {

@@ -1,4 +1,5 @@
-// Candidates for contact: pairs of discs or spheres, across periodic boundaries too; planes, the inside of a drum, meshes of triangles.
+// Candidates for contact: pairs of discs, spheres or capsules, across periodic boundaries too; planes, the inside of a drum; meshes of
+// triangles, for discs and spheres.
 //
 // All searches append to `contacts` what lies within `reach` (m): gap <= reach. A candidate that stays open costs little; a pair that is
 // missed acts one step later, with the overlap it has by then.
@@ -18,6 +19,7 @@
 
 #include "../surface/point_grid.hpp"
 #include "../surface/surface_contacts.hpp"
+#include "capsules.hpp"
 #include "types.hpp"
 
 namespace dembark {
@@ -29,22 +31,67 @@ namespace impact {
 inline double default_reach(const std::vector<Body>& bodies, double dt, double wall_speed = 0.0) {
   double speed2 = 0.0, acceleration2 = 0.0, radius = std::numeric_limits<double>::infinity();
   for (const Body& b : bodies) {
+    radius = std::min(radius, b.radius);
+    if (has_length(b)) {
+      const double half = norm(b.half_axis), end = norm(b.velocity) + half * norm(b.spin);
+      const double gain = std::isinf(b.mass) ? 0.0 : norm(b.force) / b.mass + half * norm(b.torque) / b.inertia;
+      speed2 = std::max(speed2, end * end);
+      acceleration2 = std::max(acceleration2, gain * gain);
+      continue;
+    }
     speed2 = std::max(speed2, dot(b.velocity, b.velocity));
     if (!std::isinf(b.mass)) acceleration2 = std::max(acceleration2, dot(b.force, b.force) / (b.mass * b.mass));
-    radius = std::min(radius, b.radius);
   }
   if (bodies.empty()) return 0.0;
   const double closing = dt * (2.0 * std::sqrt(speed2) + wall_speed) + 2.0 * dt * dt * std::sqrt(acceleration2);
   return std::max(reach_factor * closing, 0.01 * radius);
 }
 
-/// The centres of the bodies in cells of an edge of `cell` (m).
-inline void build_grid(const std::vector<Body>& bodies, double cell, PointGrid& grid) {
-  for (const Body& b : bodies)
-    if (!std::isfinite(b.position.x + b.position.y + b.position.z))
-      throw std::invalid_argument("body " + std::to_string(b.id) + ": position is not a finite number");
-  grid.build(bodies.size(), [&](std::size_t i) { return bodies[i].position; }, cell);
-}
+/// m, from the centre of a body to what of it is farthest.
+inline double extent(const Body& b) { return has_length(b) ? b.radius + norm(b.half_axis) : b.radius; }
+
+/// The bodies in cells: discs and balls by their centres, capsules by those of balls that cover them.
+class BodyGrid {
+ public:
+  /// range: m, largest gap of two bodies that are to be found.
+  void build(const std::vector<Body>& bodies, double range) {
+    points_.clear();
+    double largest = 0.0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const Body& b = bodies[i];
+      if (!std::isfinite(b.position.x + b.position.y + b.position.z))
+        throw std::invalid_argument("body " + std::to_string(b.id) + ": position is not a finite number");
+      const double half = has_length(b) ? norm(b.half_axis) : 0.0;
+      const int pieces = half > 0.0 ? int(std::ceil(half / std::max(b.radius, 1e-3 * half))) : 1;
+      const double cover = b.radius + half / pieces * (half > 0.0);
+      for (int k = 0; k < pieces; ++k) points_.push_back({b.position + ((2.0 * k + 1.0) / pieces - 1.0) * b.half_axis, cover, int(i)});
+      largest = std::max(largest, cover);
+    }
+    range_ = range;
+    grid_.build(points_.size(), [&](std::size_t i) { return points_[i].place; }, 2.0 * largest + range);
+  }
+
+  /// Calls visit(i, j) for pairs of bodies, with capsules several times for some.
+  template <class Visit>
+  void pairs(Visit visit) const {
+    grid_.pairs([&](int p, int q) {
+      const Point &a = points_[std::size_t(p)], &b = points_[std::size_t(q)];
+      const Vec3<double> d = a.place - b.place;
+      const double far = a.cover + b.cover + range_;
+      if (dot(d, d) <= far * far) visit(a.body, b.body);
+    });
+  }
+
+ private:
+  struct Point {
+    Vec3<double> place;  ///< m
+    double cover;        ///< m, radius of its ball
+    int body;
+  };
+  PointGrid grid_;
+  std::vector<Point> points_;
+  double range_ = 0.0;
+};
 
 struct PeriodicBox {
   Vec3<double> low{}, length{};              ///< m
@@ -66,9 +113,15 @@ class PairFinder {
     const std::vector<Body>& bodies = images ? all_ : own;
     const int count = int(own.size());
     if (!current(bodies, reach)) build(bodies, reach);
+    second_.clear();
     for (const auto& pair : pairs_) {
       if (pair.first >= count) continue;  // of an image: this contact across a boundary is found from the other side too
       const Body &a = bodies[pair.first], &b = bodies[pair.second];
+      if (levers_ && (has_length(a) || has_length(b))) {
+        capsule_contacts(a, pair.first, b, pair.second < count ? pair.second : origin_[std::size_t(pair.second - count)], reach, contacts,
+                         second_);
+        continue;
+      }
       const Vec3<double> separation = a.position - b.position;
       const double touch = a.radius + b.radius, far = touch + reach, square = dot(separation, separation);
       if (square > far * far) continue;
@@ -78,6 +131,7 @@ class PairFinder {
       const int partner = pair.second < count ? pair.second : origin_[std::size_t(pair.second - count)];
       contacts.push_back({pair.first, partner, a.id, b.id, distance - touch, normal});
     }
+    contacts.insert(contacts.end(), second_.begin(), second_.end());
   }
 
  private:
@@ -86,7 +140,7 @@ class PairFinder {
     all_ = own;
     origin_.clear();
     double largest = 0.0;
-    for (const Body& b : all_) largest = std::max(largest, b.radius);
+    for (const Body& b : all_) largest = std::max(largest, extent(b));
     const double range = 2.0 * largest + reach + box.beyond;
     double Vec3<double>::* const axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
     for (int k = 0; k < 3; ++k) {
@@ -117,32 +171,40 @@ class PairFinder {
     const double limit = 0.25 * margin_ * margin_;  // (margin / 2)^2
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const Vec3<double> moved = bodies[i].position - reference_[i].position;
-      if (!(dot(moved, moved) <= limit) || bodies[i].id != reference_[i].id || bodies[i].radius != reference_[i].radius) return false;
+      double square = dot(moved, moved);
+      if (levers_) {
+        const double most = std::sqrt(square) + norm(bodies[i].half_axis - reference_[i].half_axis);
+        square = most * most;
+      }
+      if (!(square <= limit) || bodies[i].id != reference_[i].id || bodies[i].radius != reference_[i].radius) return false;
     }
     return true;
   }
   void build(const std::vector<Body>& bodies, double reach) {
-    double largest = 0.0, sum = 0.0;
-    for (const Body& b : bodies) largest = std::max(largest, b.radius), sum += b.radius;
+    double sum = 0.0;
+    for (const Body& b : bodies) sum += b.radius;
+    levers_ = std::any_of(bodies.begin(), bodies.end(), has_length);
     // Where bodies move by a good part of their size, no list lasts longer than a step: then no margin is worth its pairs.
     const double margin = bodies.empty() ? 0.0 : 0.3 * sum / double(bodies.size());
     const bool lasting = reach < margin;
     margin_ = lasting ? margin + reach : 0.0;
     reach_ = lasting ? 2.0 * reach : reach;
-    const double range = 2.0 * largest + reach_ + margin_;
-    build_grid(bodies, range, grid_);
+    grid_.build(bodies, reach_ + margin_);
     found_.clear();
     start_.assign(bodies.size() + 1, 0);
     grid_.pairs([&](int i, int j) {
       if (bodies[i].id == bodies[j].id) return;  // a body and its image across a periodic boundary
       if (bodies[i].id > bodies[j].id) std::swap(i, j);
-      const Body &a = bodies[i], &b = bodies[j];
-      const Vec3<double> d = a.position - b.position;
-      const double far = a.radius + b.radius + reach_ + margin_;
-      if (dot(d, d) > far * far) return;
       found_.emplace_back(i, j);
-      ++start_[std::size_t(i) + 1];
     });
+    if (levers_) {
+      std::sort(found_.begin(), found_.end());
+      found_.erase(std::unique(found_.begin(), found_.end()), found_.end());
+      found_.erase(std::remove_if(found_.begin(), found_.end(),
+                                  [&](const auto& p) { return segment_gap(bodies[p.first], bodies[p.second]) > reach_ + margin_; }),
+                   found_.end());
+    }
+    for (const auto& pair : found_) ++start_[std::size_t(pair.first) + 1];
     std::partial_sum(start_.begin(), start_.end(), start_.begin());
     pairs_.resize(found_.size());
     for (const auto& pair : found_) pairs_[std::size_t(start_[std::size_t(pair.first)]++)] = pair;
@@ -160,7 +222,9 @@ class PairFinder {
   }
   std::vector<Body> all_;    ///< and their images
   std::vector<int> origin_;  ///< of each image the index of its body
-  PointGrid grid_;
+  BodyGrid grid_;
+  std::vector<Contact> second_;  ///< points of contact of pairs that have two
+  bool levers_ = false;          ///< a body of the list is a capsule
   std::vector<Body> reference_;
   std::vector<std::pair<int, int>> pairs_, found_;
   std::vector<int> start_;
@@ -172,6 +236,26 @@ inline void wall_contact(const Wall& wall, int body, const Body& b, std::int64_t
                          const Vec3<double>& velocity, std::vector<Contact>& contacts) {
   contacts.push_back({body, -1, b.id, key, gap, normal, velocity, wall.material, wall.stiffness});
 }
+
+/// Calls place(centre, end, key) for the circles with which a body may touch a plane or a drum: that of a disc or ball, or those of
+/// the two caps of a capsule, with their offsets from its centre. In ascending order of the keys.
+template <class Place>
+void each_end(const Wall& wall, const Body& b, Place place) {
+  if (!has_length(b)) return place(b.position, Vec3<double>(), wall.id);
+  const std::int64_t number = wall_number(wall.id);
+  place(b.position + b.half_axis, b.half_axis, wall_key(number, 1));
+  place(b.position - b.half_axis, -b.half_axis, wall_key(number, 0));
+}
+/// Makes the last contact that of the cap at `end`; see capsules.hpp.
+inline void on_end(const Body& b, const Vec3<double>& end, bool concave, std::vector<Contact>& contacts) {
+  if (!has_length(b)) return;
+  Contact& c = contacts.back();
+  c.lever = true;
+  c.concave = concave;
+  c.offset_a = end;
+  c.share = point_share(-2.0 * dot(end, c.normal), b.radius);
+  if (c.share == 0.0) contacts.pop_back();
+}
 }  // namespace detail
 
 /// A plane; the free space is on the side of the normal, or on both: then a body is on the side of its centre, and one whose centre lies on
@@ -180,16 +264,24 @@ struct Plane : Wall {
   Vec3<double> point{};                ///< m, any of the plane
   Vec3<double> normal{0.0, 1.0, 0.0};  ///< unit
   Vec3<double> velocity{};             ///< m/s, of the surface; moving `point` along is the caller's
+  double omega = 0.0;                  ///< rad/s, right-handed about the normal through `point`: the end plate of a drum
   bool two_sided = false;
 
-  auto fields() { return std::tie(id, material, stiffness, point, normal, velocity); }
+  auto fields() { return std::tie(id, material, stiffness, point, normal, velocity, omega); }
 };
 
 inline void plane_contacts(const std::vector<Body>& bodies, const Plane& plane, double reach, std::vector<Contact>& contacts) {
   for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const double height = dot(bodies[i].position - plane.point, plane.normal);
-    const double side = plane.two_sided && height < 0.0 ? -1.0 : 1.0, gap = side * height - bodies[i].radius;
-    if (gap <= reach) detail::wall_contact(plane, int(i), bodies[i], plane.id, gap, side * plane.normal, plane.velocity, contacts);
+    const Body& b = bodies[i];
+    const double side = plane.two_sided && dot(b.position - plane.point, plane.normal) < 0.0 ? -1.0 : 1.0;
+    detail::each_end(plane, b, [&](const Vec3<double>& centre, const Vec3<double>& end, std::int64_t key) {
+      const Vec3<double> from = centre - plane.point;
+      const double gap = side * dot(from, plane.normal) - b.radius;
+      if (gap > reach) return;
+      detail::wall_contact(plane, int(i), b, key, gap, side * plane.normal, plane.velocity + plane.omega * cross(plane.normal, from),
+                           contacts);
+      detail::on_end(b, end, false, contacts);
+    });
   }
 }
 
@@ -206,13 +298,17 @@ struct Drum : Wall {
 
 inline void cylinder_contacts(const std::vector<Body>& bodies, const Drum& drum, double reach, std::vector<Contact>& contacts) {
   for (std::size_t i = 0; i < bodies.size(); ++i) {
-    Vec3<double> arm = bodies[i].position - drum.point;
-    arm -= dot(arm, drum.axis) * drum.axis;
-    const double distance = norm(arm), gap = drum.radius - distance - bodies[i].radius;
-    if (gap > reach || !(distance > 0.0)) continue;
-    const Vec3<double> outward = arm * (1.0 / distance);
-    detail::wall_contact(drum, int(i), bodies[i], drum.id, gap, -outward,
-                         drum.velocity + (drum.omega * drum.radius) * cross(drum.axis, outward), contacts);
+    const Body& b = bodies[i];
+    detail::each_end(drum, b, [&](const Vec3<double>& centre, const Vec3<double>& end, std::int64_t key) {
+      Vec3<double> arm = centre - drum.point;
+      arm -= dot(arm, drum.axis) * drum.axis;
+      const double distance = norm(arm), gap = drum.radius - distance - b.radius;
+      if (gap > reach || !(distance > 0.0)) return;
+      const Vec3<double> outward = arm * (1.0 / distance);
+      detail::wall_contact(drum, int(i), b, key, gap, -outward, drum.velocity + (drum.omega * drum.radius) * cross(drum.axis, outward),
+                           contacts);
+      detail::on_end(b, end, true, contacts);
+    });
   }
 }
 

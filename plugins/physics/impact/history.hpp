@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <tuple>
@@ -29,6 +30,15 @@ struct ContactHistory {
 
   auto fields() { return std::tie(active, deformation, elastic, friction.displacement, friction.slip, normal, impact); }
 };
+
+/// J, in the friction spring.
+inline double sheared_energy(const Row& row, const ContactHistory& history) {
+  return 0.5 * tangential_stiffness(row) * dot(history.friction.displacement, history.friction.displacement);
+}
+/// J, in both springs.
+inline double elastic_energy(const Row& row, const ContactHistory& history) {
+  return 0.5 * row.stiffness * history.deformation * history.deformation + sheared_energy(row, history);
+}
 
 /// All that a step leaves to the next.
 struct Histories {
@@ -130,14 +140,16 @@ class HistoryKeeper {
     for (std::size_t o = 0; o < left_.size(); ++o)
       if (left_[o]) orphans_.push_back(o);
     if (!base().begun) deform_overlaps(rows);
+    if (!orphans_.empty())
+      for (Row& r : rows)
+        if (r.b < 0 && r.before == &blank_) inherit(r);
+    keep_energies(rows);
     if (orphans_.empty()) return;
-    for (Row& r : rows)
-      if (r.b < 0 && r.before == &blank_) inherit(r);
     for (const std::size_t o : orphans_) {
       const Key& key = base().keys[o];
       if (!left_[o] || !contacts[o].active) continue;
       lost_bodies.push_back(key.first);
-      if (key.second >= 0) lost_bodies.push_back(key.second);
+      if (key.second >= 0) lost_bodies.push_back(shown_id(key.second));
     }
   }
 
@@ -191,6 +203,22 @@ class HistoryKeeper {
     }
   }
 
+  /// Springs whose stiffness has changed with the share of their contact hold what they held.
+  void keep_energies(std::vector<Row>& rows) {
+    changed_.clear();
+    changed_.reserve(rows.size());  // rows point into it
+    for (Row& r : rows) {
+      if (!r.lever || r.before == &blank_) continue;
+      const double held = elastic_energy(r, *r.before);
+      if (held == r.before->elastic || !(held > 0.0)) continue;
+      const double part = std::sqrt(r.before->elastic / held);
+      ContactHistory& now = changed_.emplace_back(*r.before);
+      now.deformation *= part;
+      now.friction.displacement *= part;
+      r.before = &now;
+    }
+  }
+
   /// A body that rolls from one feature of a wall to the next keeps its contact: the new one takes on the history of the one that has
   /// gone and points nearly the same way.
   void inherit(Row& row) {
@@ -211,6 +239,7 @@ class HistoryKeeper {
   bool again_ = false;
   Histories before_, after_, next_;
   std::vector<ContactHistory> overlaps_;  ///< see deform_overlaps()
+  std::vector<ContactHistory> changed_;   ///< see keep_energies()
   std::size_t cursor_ = 0;                ///< see recall()
   std::vector<char> left_;                ///< of base(): no row has taken it on
   std::vector<std::size_t> orphans_;

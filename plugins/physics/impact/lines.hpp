@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include "../lcp/residual.hpp"
@@ -16,33 +17,61 @@ namespace dembark {
 namespace impact {
 
 /// w = q + A z with A = diag(compliance) + scale G^T M'^-1 G; see system.hpp. The rows of lcp/relaxation.hpp.
-/// Width: components that are kept of each vector, 2 or 4 (the last one zero).
+/// Width: components that are kept of each vector, 2 or 4 (the last one zero), of contacts on the lines of the centres; 6, for contacts
+/// with a lever too: the normal and its moment about the body, either over the root of its inertia.
 template <int Width>
 class Lines {
+  static constexpr bool central = Width != 6;
+
  public:
   static constexpr double worth_steps = 500.0;  ///< the matrix and its order have to be made as well
 
   using Vector = Eigen::Matrix<double, Width, 1>;
   using Component = double Vec3<double>::*;
 
+  struct Nothing {};
+  using OfB = std::conditional_t<central, Nothing, Vector>;
+
   /// A row of the problem.
   struct Line {
-    Vector normal;                        ///< unit
-    double of_a, of_b;                    ///< response of the bodies to a unit force, m/N
+    Vector normal;                        ///< unit; with a lever, of a
+    OfB normal_b;                         ///< with a lever
+    double of_a, of_b;                    ///< response of the bodies to a unit force, m/N; with a lever it is in the normals
     double compliance, inverse, root, q;  ///< inverse: 1 over the diagonal; root: of it
     int a, b, row;
+
+    const Vector& other() const {
+      if constexpr (central) return normal;
+      else return normal_b;
+    }
+    /// Share of the bodies in the diagonal, m/N.
+    double give() const {
+      if constexpr (central) return of_a + of_b;
+      else return normal.squaredNorm() + normal_b.squaredNorm();
+    }
+    /// By how far (m) the shifts of the bodies open the row.
+    double parted(const Vector& by_a, const Vector& by_b) const {
+      if constexpr (central) return normal.dot(by_a - by_b);
+      else return normal.dot(by_a) - normal_b.dot(by_b);
+    }
   };
 
   /// What a sweep reads of a row and changes, in the order of the sweep: the step leads to z = keep z - q - pull (shift_a - shift_b).
   struct RelaxationRow {
     Vector pull, on_a, on_b;  ///< the normal over the row's diagonal; response of the bodies, m/N
+    OfB pull_b;               ///< with a lever
     double keep, q, z;        ///< share of the bodies in the diagonal; q over it, N; N
     double base;              ///< N, what steps are compared with, but for z
     Vector *a, *b;            ///< shifts of the bodies
+
+    double pulled() const {
+      if constexpr (central) return pull.dot(*a - *b);
+      else return pull.dot(*a) - pull_b.dot(*b);
+    }
   };
 
   /// The rows of a step, which must outlive its solves. bodies: with 1/m' as `inverse`; scale: h tau^2 (s^2); axes: three components, of
-  /// which the first `Width` are kept.
+  /// which the first `Width` are kept; not read with levers.
   void prepare(const std::vector<Row>& rows, const std::vector<BodyResponse>& bodies, double scale, const Component* axes) {
     rows_ = &rows;
     bodies_ = &bodies;
@@ -104,7 +133,7 @@ class Lines {
     double most = 0.0;
     const RelaxationRow* const end = relaxation_.data() + near_;
     for (RelaxationRow* v = relaxation_.data(); v != end; ++v) {
-      const double old = v->z, free = v->keep * old - (v->q + v->pull.dot(*v->a - *v->b)), next = free > 0.0 ? free : 0.0;
+      const double old = v->z, free = v->keep * old - (v->q + v->pulled()), next = free > 0.0 ? free : 0.0;
       const double step = next - old;
       *v->a += step * v->on_a;
       *v->b -= step * v->on_b;
@@ -134,7 +163,7 @@ class Lines {
     r.resize(near());
     for (Eigen::Index i = 0; i < near(); ++i) {
       const Line& l = lines_[std::size_t(i)];
-      const double z = force(i), whole = parted(l), own = (l.of_a + l.of_b) * z, give = l.compliance * z;
+      const double z = force(i), whole = parted(l), own = l.give() * z, give = l.compliance * z;
       r.z[i] = z;
       r.w[i] = l.q + give + whole;
       r.s[i] = std::fabs(l.q) + own + give + std::fabs(whole - own);
@@ -170,7 +199,7 @@ class Lines {
       push_.resize(lines.shift_.size());
       for (std::size_t k = 0; k < face.size(); ++k) {
         const Line& l = lines.lines_[std::size_t(face[k])];
-        links_[k] = {(l.root * std::sqrt(l.of_a)) * l.normal, (l.root * std::sqrt(l.of_b)) * l.normal, &push_[std::size_t(l.a)],
+        links_[k] = {(l.root * std::sqrt(l.of_a)) * l.normal, (l.root * std::sqrt(l.of_b)) * l.other(), &push_[std::size_t(l.a)],
                      &push_[std::size_t(l.b)]};
       }
     }
@@ -208,14 +237,30 @@ class Lines {
     l.row = row;
     l.a = r.a;
     l.b = r.b >= 0 ? r.b : int(bodies_->size());
-    l.of_a = scale_ * (*bodies_)[std::size_t(r.a)].inverse;
-    l.of_b = r.b >= 0 ? scale_ * (*bodies_)[std::size_t(r.b)].inverse : 0.0;
-    l.normal.setZero();
-    for (int c = 0; c < std::min(Width, 3); ++c) l.normal[c] = r.normal.*axes_[c];
     l.compliance = r.compliance;
-    l.inverse = 1.0 / (l.compliance + l.of_a + l.of_b);
+    if constexpr (central) {
+      l.of_a = scale_ * (*bodies_)[std::size_t(r.a)].inverse;
+      l.of_b = r.b >= 0 ? scale_ * (*bodies_)[std::size_t(r.b)].inverse : 0.0;
+      l.normal.setZero();
+      for (int c = 0; c < std::min(Width, 3); ++c) l.normal[c] = r.normal.*axes_[c];
+      l.inverse = 1.0 / (l.compliance + l.of_a + l.of_b);
+    } else {
+      l.of_a = 1.0;
+      l.of_b = r.b >= 0 ? 1.0 : 0.0;
+      l.normal = with_lever((*bodies_)[std::size_t(r.a)], r.normal, r.moment_a);
+      if (r.b >= 0) l.normal_b = with_lever((*bodies_)[std::size_t(r.b)], r.normal, r.moment_b);
+      else l.normal_b.setZero();
+      l.inverse = 1.0 / (l.compliance + l.give());
+    }
     l.root = std::sqrt(l.inverse);
     if (i < near_) place(i);
+  }
+
+  Vector with_lever(const BodyResponse& body, const Vec3<double>& normal, const Vec3<double>& moment) const {
+    const Vec3<double> n = std::sqrt(scale_ * body.inverse) * normal, m = std::sqrt(scale_ * body.spin_inverse) * moment;
+    Vector v;
+    v << n.x, n.y, n.z, m.x, m.y, m.z;
+    return v;
   }
 
   /// The constant part of a relaxation row.
@@ -223,9 +268,10 @@ class Lines {
     const Line& l = lines_[i];
     RelaxationRow& v = relaxation_[i];
     v.pull = l.inverse * l.normal;
+    if constexpr (!central) v.pull_b = l.inverse * l.normal_b;
     v.on_a = l.of_a * l.normal;
-    v.on_b = l.of_b * l.normal;
-    v.keep = (l.of_a + l.of_b) * l.inverse;
+    v.on_b = l.of_b * l.other();
+    v.keep = l.give() * l.inverse;
     v.a = &shift_[std::size_t(l.a)];
     v.b = &shift_[std::size_t(l.b)];
   }
@@ -239,8 +285,7 @@ class Lines {
     v.base = std::fabs(v.q) + floor_ * l.root;
   }
 
-  /// By how far (m) the shifts of the bodies open a row.
-  double parted(const Line& l) const { return l.normal.dot(shift_[std::size_t(l.a)] - shift_[std::size_t(l.b)]); }
+  double parted(const Line& l) const { return l.parted(shift_[std::size_t(l.a)], shift_[std::size_t(l.b)]); }
 
   const std::vector<Row>* rows_ = nullptr;
   const std::vector<BodyResponse>* bodies_ = nullptr;

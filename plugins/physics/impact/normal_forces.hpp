@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <sstream>
 #include <stdexcept>
@@ -48,9 +49,12 @@ class NormalForces {
     assembled_ = false;
     relaxes_ = options.method == LcpMethod::automatic && assembly.size() > few;
     if (!relaxes_) return;
-    planar_ = find_plane(assembly.rows());
-    if (planar_) flat_.rows.prepare(assembly.rows(), motion.response, scale, axes_);
-    else spatial_.rows.prepare(assembly.rows(), motion.response, scale, axes_);
+    const std::vector<Row>& rows = assembly.rows();
+    levers_ = std::any_of(rows.begin(), rows.end(), [](const Row& r) { return r.lever; });
+    planar_ = !levers_ && find_plane(rows);
+    if (levers_) turning_.rows.prepare(rows, motion.response, scale, axes_);
+    else if (planar_) flat_.rows.prepare(rows, motion.response, scale, axes_);
+    else spatial_.rows.prepare(rows, motion.response, scale, axes_);
   }
 
   /// Whether solves before the last one of a step only come near.
@@ -61,7 +65,9 @@ class NormalForces {
   void solve(Assembly& assembly, const Motion& motion, bool last, Unknowns& of, StepReport& report) {
     if (!relaxes_) return solve_exactly(assembly, motion, of, report);
     before_ = of.active;
-    const bool found = planar_ ? relax(flat_, last, of, report) : relax(spatial_, last, of, report);
+    const bool found = levers_   ? relax(turning_, last, of, report)
+                       : planar_ ? relax(flat_, last, of, report)
+                                 : relax(spatial_, last, of, report);
     of.flag();
     if (!found) return solve_exactly(assembly, motion, of, report);
     for (std::size_t i = 0; i < before_.size(); ++i) report.pivots += of.active[i] != before_[i];
@@ -124,11 +130,12 @@ class NormalForces {
 
   double scale_ = 0.0;
   LcpOptions options_;
-  bool relaxes_ = false, assembled_ = false, planar_ = false;  ///< in this step
+  bool relaxes_ = false, assembled_ = false, planar_ = false, levers_ = false;  ///< in this step
   Lines<2>::Component axes_[3] = {};
   std::vector<char> before_;
   lcp::Relaxation<Lines<2>> flat_;
   lcp::Relaxation<Lines<4>> spatial_;
+  lcp::Relaxation<Lines<6>> turning_;
   LcpSolver solver_;
 };
 

@@ -1,6 +1,7 @@
 // A few bodies, walls and constant forces on their own, without an engine: the leapfrog that engines run, around impact::System.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -25,6 +26,18 @@ class Scene {
     velocity_.resize(bodies_.size());
     spin_.resize(bodies_.size());
   }
+  /// Bodies with a length and an orientation.
+  Scene(Settings settings, std::vector<Capsule> capsules) : Scene(std::move(settings), std::vector<Body>()) {
+    for (Capsule& c : capsules) {
+      c.begin();
+      bodies_.push_back(c);
+      length_.push_back(c.length);
+      orientation_.push_back(normalised(c.orientation));
+      momentum_.push_back(std::isinf(c.inertia) ? Vec3<double>() : inertia(c).momentum(c.spin, axis(c)));
+    }
+    velocity_.resize(bodies_.size());
+    spin_.resize(bodies_.size());
+  }
 
   System& system() { return system_; }
   const System& system() const { return system_; }
@@ -35,13 +48,28 @@ class Scene {
   /// Of the moment; need forces().
   const std::vector<Vec3<double>>& velocity() const { return velocity_; }
   const std::vector<Vec3<double>>& spin() const { return spin_; }
+  /// Of the moment; empty where the bodies have none.
+  const std::vector<Quaternion>& orientation() const { return orientation_; }
+
+  /// Of the pairs of bodies, or of a body and a wall, that overlap now, that with the largest overlap over the smaller radius; its keys and
+  /// that ratio, 0 where nothing overlaps.
+  std::pair<Key, double> worst_overlap() {
+    std::vector<Contact> contacts;
+    find(0.0, contacts);
+    std::pair<Key, double> worst{};
+    for (const Contact& c : contacts) {
+      const double a = bodies_[std::size_t(c.a)].radius, radius = c.b >= 0 ? std::min(a, bodies_[std::size_t(c.b)].radius) : a;
+      if (-c.gap > worst.second * radius) worst = {{c.key_a, shown_id(c.key_b)}, -c.gap / radius};
+    }
+    return worst;
+  }
 
   /// Contact forces of the moment. Asking twice changes nothing.
   const StepReport& forces() {
     const double kick = count_ == 0 ? 0.5 : 1.0, dt = system_.settings().dt;
     const auto search = [this](double far, std::vector<Contact>& contacts) {
       if (row) row_contacts(contacts);
-      else around.find(bodies_, far, contacts);
+      else find(far, contacts);
     };
     const StepReport& report = system_.step(bodies_, search, around.wall_speed(), time(), kick, row ? INFINITY : reach);
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
@@ -50,7 +78,7 @@ class Scene {
       spin_[i] = b.spin;
       if (count_ == 0) continue;
       velocity_[i] += (0.5 * dt / b.mass) * (b.force + system_.wrenches()[i].force);
-      spin_[i] += (0.5 * dt / b.inertia) * (b.torque + system_.wrenches()[i].torque);
+      spin_[i] += kicked(i, 0.5 * dt);
     }
     return report;
   }
@@ -61,8 +89,9 @@ class Scene {
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       Body& b = bodies_[i];
       b.velocity += (kick / b.mass) * (b.force + system_.wrenches()[i].force);
-      b.spin += (kick / b.inertia) * (b.torque + system_.wrenches()[i].torque);
       b.position += dt * b.velocity;
+      if (orientation_.empty()) b.spin += kicked(i, kick);
+      else rotate(i, kick, dt);
     }
     for (Plane& p : around.planes) p.point += dt * p.velocity;
     for (Drum& d : around.drums) d.point += dt * d.velocity;
@@ -82,7 +111,8 @@ class Scene {
     double sum = 0.0;
     for (const Body& b : bodies_) {
       if (!std::isinf(b.mass)) sum += 0.5 * b.mass * dot(b.velocity, b.velocity);
-      if (!std::isinf(b.inertia)) sum += 0.5 * b.inertia * dot(b.spin, b.spin);
+      if (std::isinf(b.inertia)) continue;
+      sum += orientation_.empty() ? 0.5 * b.inertia * dot(b.spin, b.spin) : inertia(b).energy(b.spin, axis(b));
     }
     return sum;
   }
@@ -100,11 +130,58 @@ class Scene {
   }
 
  private:
+  /// Bodies may leave a periodic box, and their contacts are those of their images in it.
+  void find(double far, std::vector<Contact>& contacts) {
+    const PeriodicBox& box = around.pairs.box;
+    if (!box.periodic[0] && !box.periodic[1] && !box.periodic[2]) return around.find(bodies_, far, contacts);
+    inside_ = bodies_;
+    double Vec3<double>::* const axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
+    for (int k = 0; k < 3; ++k)
+      for (std::size_t i = 0; box.periodic[k] && i < inside_.size(); ++i) {
+        double& at = inside_[i].position.*axes[k];
+        at -= box.length.*axes[k] * std::floor((at - box.low.*axes[k]) / (box.length.*axes[k]));
+      }
+    around.find(inside_, far, contacts);
+  }
+
+  /// Of a capsule, unit; of one without a length any will do.
+  static Vec3<double> axis(const Body& b) {
+    const double half = norm(b.half_axis);
+    return half > 0.0 ? b.half_axis * (1.0 / half) : Vec3<double>{0.0, 0.0, 1.0};
+  }
+  static SymmetricInertia inertia(const Body& b) { return {has_length(b) ? b.axial_inertia : b.inertia, b.inertia}; }
+  void point_axis(std::size_t i) { bodies_[i].half_axis = (0.5 * length_[i]) * orientation_[i].turned({0.0, 0.0, 1.0}); }
+
+  /// Change of spin (rad/s) by all torques in a stretch of time (s).
+  Vec3<double> kicked(std::size_t i, double stretch) const {
+    const Body& b = bodies_[i];
+    const Vec3<double> torque = b.torque + system_.wrenches()[i].torque;
+    if (!has_length(b) || std::isinf(b.inertia)) return (stretch / b.inertia) * torque;
+    return stretch * inertia(b).spin(torque, axis(b));
+  }
+
+  /// A kick (s) of the torques, and free rotation for dt (s). The angular momentum is what is kept, to the last digit.
+  void rotate(std::size_t i, double kick, double dt) {
+    Body& b = bodies_[i];
+    if (std::isinf(b.inertia)) {
+      orientation_[i] = normalised(rotation_by(dt * b.spin) * orientation_[i]);
+      return point_axis(i);
+    }
+    momentum_[i] += kick * (b.torque + system_.wrenches()[i].torque);
+    orientation_[i] = rotated_freely(inertia(b), dt, momentum_[i], orientation_[i]);
+    point_axis(i);
+    b.spin = inertia(b).spin(momentum_[i], axis(b));
+  }
+
   void archive(Archive& a) {
     std::vector<double> system = system_.state();
     a(system), a(count_);
     if (a.reading()) system_.restore(system);
     for (Body& b : bodies_) a(b.position), a(b.velocity), a(b.spin);
+    for (std::size_t i = 0; i < orientation_.size(); ++i) {
+      a(orientation_[i]), a(momentum_[i]);
+      point_axis(i);
+    }
     for (Plane& p : around.planes) a(p.point);
     for (Drum& d : around.drums) a(d.point);
   }
@@ -125,6 +202,10 @@ class Scene {
   System system_;
   std::vector<Body> bodies_;
   std::vector<Vec3<double>> velocity_, spin_;
+  std::vector<Body> inside_;             ///< see find()
+  std::vector<double> length_;           ///< m, of capsules
+  std::vector<Quaternion> orientation_;  ///< likewise
+  std::vector<Vec3<double>> momentum_;   ///< kg m^2/s, likewise, of rotation
   std::int64_t count_ = 0;
 };
 

@@ -57,12 +57,11 @@ class Screening {
   double swept(const Motion& motion, double wall_speed) const {
     double first = 0.0, second = 0.0;
     for (std::size_t b = 0; b < motion.response.size(); ++b) {
-      const Vec3<double> shift = motion.shift(b, rate_, scale_);
-      const double square = dot(shift, shift);
-      second = std::max(second, std::min(first, square));
-      first = std::max(first, square);
+      const double shift = motion.shift(b, rate_, scale_);
+      second = std::max(second, std::min(first, shift));
+      first = std::max(first, shift);
     }
-    return std::sqrt(first) + std::max(std::sqrt(second), rate_ * wall_speed);
+    return first + std::max(second, rate_ * wall_speed);
   }
 
  private:

@@ -185,11 +185,20 @@ class System {
       const Row& r = rows[i];
       const ContactHistory& before = *r.before;
       offset_[Eigen::Index(i)] =
-          r.gap + (2.0 * settings_.theta - 1.0) * settings_.dt * motion_.gap_rate(r) + r.viscous * r.compliance * before.deformation;
+          gap_of(r) + (2.0 * settings_.theta - 1.0) * settings_.dt * motion_.gap_rate(r) + r.viscous * r.compliance * before.deformation;
       forces_.active[i] = before.active;
       // Where to begin: the contact force as if the spring were at rest.
       forces_.z[Eigen::Index(i)] = before.active ? r.stiffness * before.deformation : 0.0;
     }
+  }
+
+  /// m, of the undeformed bodies, as the contact law takes it. The law plans with the turn of a step as if it were straight, and a capsule
+  /// that swings arrives short of the plan by up to (omega tau)^2 / 2 of its lever. With theta = 1 the springs are not charged with that:
+  /// what they have been compressed by is what the last step planned, at most, and energy never grows. A drum bends towards the bodies, and
+  /// the logs would slowly sink into it.
+  double gap_of(const Row& r) const {
+    if (!r.lever || r.concave || settings_.theta < 1.0) return r.gap;
+    return std::max(r.gap, -r.before->deformation);
   }
 
   /// The normal forces, with the friction forces as they are.
@@ -214,7 +223,7 @@ class System {
     history_.settle(report_);
     motion_.go_back(middle);
     for (std::size_t i = 0; i < rows.size(); ++i)
-      if (forces_.active[i] || !rows[i].before->idle()) finish_contact(i, length);
+      if (forces_.active[i] || !rows[i].before->idle() || dot(friction_.force[i], friction_.force[i]) > 0.0) finish_contact(i, length);
     wrenches_.assign(bodies.size(), {});
     for (const int b : motion_.damped) {
       const Vec3<double> change = motion_.change[b].velocity;
@@ -226,6 +235,7 @@ class System {
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       wrenches_[b].force += motion_.normal[b].force + motion_.tangential[b].force;
       wrenches_[b].torque += motion_.tangential[b].torque;
+      if (!motion_.normal_torque.empty()) wrenches_[b].torque += motion_.normal_torque[b];
     }
     report_.pivots_total += report_.pivots;
     report_.peak_force_so_far = std::max(report_.peak_force_so_far, report_.peak_force);
@@ -245,7 +255,7 @@ class System {
     now.deformation = (n + r.viscous * before.deformation) * r.compliance;
     // Below the last digit of the gap, what is left of it acts on nothing any more.
     if (!now.active && now.deformation < std::numeric_limits<double>::epsilon() * std::abs(r.gap)) now.deformation = 0.0;
-    now.elastic = 0.5 * r.stiffness * now.deformation * now.deformation + sheared(r, now);
+    now.elastic = elastic_energy(r, now);
     report_.elastic_energy += now.elastic;
 
     // What the bodies (and the wall) put into the contact and its springs do not hold is lost.
@@ -264,7 +274,8 @@ class System {
       impact.turn_b = r.b >= 0 ? turns_[r.b] : 0.0;
     }
     impact.dissipated += lost;
-    impact.friction_loss -= length * dot(friction_.force[i], motion_.surface_velocity(r)) + sheared(r, now) - sheared(r, before);
+    impact.friction_loss -=
+        length * dot(friction_.force[i], motion_.surface_velocity(r)) + sheared_energy(r, now) - sheared_energy(r, before);
     if (now.active) {
       ++report_.active;
       impact.duration += length;
@@ -276,11 +287,6 @@ class System {
       history_.finish({r.key_a, r.key_b}, now);
     }
     if (!now.idle()) history_.add({r.key_a, r.key_b}, now);
-  }
-
-  /// J, in the friction spring.
-  static double sheared(const Row& row, const ContactHistory& history) {
-    return 0.5 * tangential_stiffness(row) * dot(history.friction.displacement, history.friction.displacement);
   }
 
   FormatVersion format_{4.0};

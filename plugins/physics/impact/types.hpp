@@ -1,8 +1,8 @@
 // Impacts of logs by a linear complementarity problem: what goes in and what comes out.
 //
-// A body (a log, in cross-section a disc) has its mass at the centre and a massless boundary on a spring of stiffness s (N/m). In a
-// contact the gap between the boundaries and the normal force obey D >= 0, N >= 0, D N = 0; every time step solves all contacts
-// together. The scheme is in system.hpp. The model is that of G. N. Kolesnikov (2013), in the form of leapfrog.
+// A body (a log, in cross-section a disc, in space a capsule) has its mass at the centre and a massless boundary on a spring of stiffness
+// s (N/m). In a contact the gap between the boundaries and the normal force obey D >= 0, N >= 0, D N = 0; every time step solves all
+// contacts together. The scheme is in system.hpp. The model is that of G. N. Kolesnikov (2013), in the form of leapfrog.
 //
 // Units SI. Normals point from b (or the wall) to a: the direction of the force on a.
 #pragma once
@@ -37,7 +37,11 @@ struct Body {
   Vec3<double> spin{};      ///< rad/s
   Vec3<double> force{};     ///< N, everything but these contacts (weight, ...)
   Vec3<double> torque{};    ///< N m
+  // Of a capsule (capsules.hpp). The inertia above is that across the axis then.
+  Vec3<double> half_axis{};    ///< m, from the centre to that of a cap; zero: a disc or a ball
+  double axial_inertia = 0.0;  ///< kg m^2, about the axis, > 0; +inf = does not turn about it
 
+  /// Of a disc or a ball; what a capsule has more is in Capsule.
   auto fields() { return std::tie(id, mass, inertia, radius, material, position, velocity, spin, force, torque); }
 };
 
@@ -45,6 +49,9 @@ struct Body {
 inline double cylinder_inertia(double mass, double radius) { return 0.5 * mass * radius * radius; }
 /// Inertia (kg m^2) of a solid sphere, 2 m r^2 / 5.
 inline double sphere_inertia(double mass, double radius) { return 0.4 * mass * radius * radius; }
+
+/// Whether the body is a capsule.
+inline bool has_length(const Body& b) { return b.half_axis.x != 0.0 || b.half_axis.y != 0.0 || b.half_axis.z != 0.0; }
 
 /// What all walls have in common. The wall has infinite mass and a local stiffness of its own.
 struct Wall {
@@ -60,20 +67,27 @@ inline std::int64_t wall_key(std::int64_t number, std::int64_t feature = 0) { re
 inline std::int64_t wall_number(std::int64_t key) { return (-1 - key) / (std::int64_t(1) << 32); }
 /// That of the feature.
 inline std::int64_t wall_feature(std::int64_t key) { return (-1 - key) % (std::int64_t(1) << 32); }
+/// The key of body `id` (below 2^52) as the second one of a contact that is number `point` (0 or 1) of those of the pair.
+inline std::int64_t body_key(std::int64_t id, std::int64_t point) { return id + point * (std::int64_t(1) << 52); }
 /// What users see of a key: the id of a body, or -1, -2, ... for the first, second, ... wall.
-inline std::int64_t shown_id(std::int64_t key) { return key < 0 ? -1 - wall_number(key) : key; }
+inline std::int64_t shown_id(std::int64_t key) { return key < 0 ? -1 - wall_number(key) : key % (std::int64_t(1) << 52); }
 
 /// A candidate: a pair that touches or may touch within the step. Geometry is that of step n.
 struct Contact {
   int a = 0;                      ///< index into the bodies
   int b = -1;                     ///< index into the bodies, or -1: a wall
   std::int64_t key_a = 0;         ///< id of body a
-  std::int64_t key_b = -1;        ///< id of body b, or the wall's key (< 0); contacts keep their history by these two
+  std::int64_t key_b = -1;        ///< key of body b, or the wall's (< 0); contacts keep their history by these two
   double gap = 0.0;               ///< m, < 0 = overlap of the undeformed bodies
   Vec3<double> normal{};          ///< unit, from b (or the wall) to a
   Vec3<double> point_velocity{};  ///< m/s, walls: velocity of their surface at the contact
   int wall_material = 0;          ///< walls: index into Settings::materials
   double wall_stiffness = std::numeric_limits<double>::infinity();  ///< walls: s_w, N/m
+  // Of contacts that act off the centre of a body, as those of capsules do.
+  bool lever = false;                   ///< what follows counts
+  bool concave = false;                 ///< the wall bends towards the body: the inside of a drum
+  double share = 1.0;                   ///< of the stiffness and damping of the contact of two bodies, in (0, 1]
+  Vec3<double> offset_a{}, offset_b{};  ///< m, from the centres of the bodies to those of the circles that touch
 };
 
 /// A gap is a candidate if this factor times the free motion of a step would close it: forces of other contacts close gaps, too.

@@ -83,7 +83,7 @@ TEST_CASE("one body far away adds no work to the search") {
     std::vector<Body> bodies = cloud(1000, 6.0, false, 3);
     bodies[0].position.x += far;
     PointGrid grid;
-    build_grid(bodies, 0.3, grid);
+    grid.build(bodies.size(), [&](std::size_t i) { return bodies[i].position; }, 0.3);
     int count = 0;
     grid.pairs([&](int, int) { ++count; });
     return count;

@@ -8,7 +8,7 @@ from dembark.physics.capillary import CAPILLARY_MODELS, capillary_force, rupture
 from dembark.physics.contact import Body, Contact, ContactForce, RollingResistance, Trajectory, collide, drop
 from dembark.physics.events import HardGrains, HardMotion, HardWall
 from dembark.physics.friction import FinnieRabinowicz, FrictionLaw, FrictionPath
-from dembark.physics.impact import Drum, Impact, ImpactChain, ImpactMotion, ImpactSystem, Plane
+from dembark.physics.impact import CapsuleSystem, Drum, Impact, ImpactChain, ImpactMotion, ImpactSystem, Plane
 from dembark.physics.integration import AdamsEvent, AdamsSolution, LocalErrors, integrate_adams, local_errors
 from dembark.physics.lcp import LCP_METHODS, LcpCertificate, LcpResult, LcpSolver, solve_lcp
 from dembark.physics.liquid import LIQUID_RETURNS, LIQUID_SHARES, LiquidBridge, liquid_bridge, liquid_grant, liquid_share
@@ -27,6 +27,7 @@ __all__ = [
     "AdamsEvent",
     "AdamsSolution",
     "Body",
+    "CapsuleSystem",
     "Contact",
     "ContactForce",
     "Drum",

@@ -1,7 +1,8 @@
-"""Impacts of logs without an engine: rows in one dimension, and small systems in the plane or in space with walls and friction.
+"""Impacts of logs without an engine: rows in one dimension, and systems in the plane or in space with walls and friction.
 
-The scheme is that of the LIGGGHTS fix and the YADE engine; the C++ headers are the same. A log has its mass at the centre and a massless
-boundary on a spring; in every time step the gaps and normal forces of all contacts are one linear complementarity problem.
+In the plane a log is a disc, in space a capsule: a cylinder with rounded ends. The scheme is that of the LIGGGHTS fix and the YADE engine;
+the C++ headers are the same. A log has its mass at the centre and a massless boundary on a spring; in every time step the gaps and normal
+forces of all contacts are one linear complementarity problem.
 Formulas: docs/theory/lcp.md.
 """
 
@@ -24,6 +25,7 @@ Friction = float | FinnieRabinowicz | None
 # Rows of the bodies as _physics.ImpactScene takes them.
 _BODY = np.dtype([("id", float), ("mass", float), ("inertia", float), ("radius", float), ("material", float), ("position", float, 3),
                   ("velocity", float, 3), ("spin", float, 3), ("force", float, 3), ("torque", float, 3)])
+_CAPSULE = np.dtype([*_BODY.descr, ("axial_inertia", float), ("length", float), ("orientation", float, 4)])
 _REPORT = ("contacts", "active", "impacts_begun", "peak_force", "impulse_sum", "dissipated_energy", "elastic_energy", "pivots",
            "block_steps", "pivots_total", "certificate", "worst_certificate", "peak_force_so_far", "kinetic_energy")
 
@@ -61,6 +63,13 @@ class ImpactMotion:
     elastic_energy: Floats  # (n,) J
     dissipated_energy: Floats  # (n,) J, total: friction, damping, and the loss of the scheme
     report: dict[str, Floats]  # (n,) each: contacts, active, impacts_begun, peak_force, impulse_sum, pivots, certificate, ...
+    orientation: Floats  # capsules only: (n, b, 4), unit quaternions (w, x, y, z) from the axes of the body, z along its own, to space
+
+    @property
+    def axis(self) -> Floats:
+        """Unit vectors along the capsules, (n, b, 3)."""
+        w, x, y, z = np.moveaxis(self.orientation, -1, 0)
+        return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +81,7 @@ class Plane:
     stiffness : N/m, of the wall's surface; inf = rigid
     velocity : m/s
     friction : with every body: a coefficient, a FinnieRabinowicz, or None for that of the bodies
+    omega : rad/s, right-handed about the normal through `point`
     """
 
     point: Sequence[float]
@@ -79,17 +89,19 @@ class Plane:
     stiffness: float = np.inf
     velocity: Sequence[float] = (0.0, 0.0, 0.0)
     friction: Friction = None
+    omega: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drum:
-    """The inside of a circular cylinder along z that turns about its axis.
+    """The inside of a circular cylinder without ends that turns about its axis, z unless another one is given.
 
     radius : m
-    centre : m, (x, y)
-    omega : rad/s, anticlockwise
+    centre : m, any point of the axis, 2 or 3 components
+    omega : rad/s, right-handed about the axis (along z: anticlockwise)
     stiffness : N/m, local stiffness of the shell; inf = rigid
     friction : as for a plane
+    axis : any length
     """
 
     radius: float
@@ -97,6 +109,15 @@ class Drum:
     omega: float = 0.0
     stiffness: float = np.inf
     friction: Friction = None
+    axis: Sequence[float] = (0.0, 0.0, 1.0)
+
+    def end_plates(self, length: float) -> tuple[Plane, Plane]:
+        """Plates that close the drum at half of `length` (m) behind and ahead of its centre, and turn with it."""
+        half = 0.5 * float(numbers("length", length, "m", low=0.0, low_open=True))
+        axis, centre = _direction("axis", self.axis), _three("centre", self.centre, "m")
+        back, ahead = (Plane(point=tuple(centre - side * half * axis), normal=tuple(side * axis), stiffness=self.stiffness,
+                             friction=self.friction, omega=side * self.omega) for side in (1.0, -1.0))
+        return back, ahead
 
 
 _each = partial(one_each, thing="body")
@@ -117,8 +138,15 @@ def _three(name: str, value: Sequence[float], unit: str) -> Floats:
     return np.append(array, 0.0)[:3]
 
 
-def _bodies(n: int) -> NDArray[np.void]:
-    bodies = np.zeros(n, _BODY)
+def _direction(name: str, value: Sequence[float]) -> Floats:
+    array = _three(name, value, "")
+    if not array.any():
+        raise ValueError(f"{name} must not be zero")
+    return array / np.linalg.norm(array)
+
+
+def _bodies(n: int, kind: np.dtype[np.void] = _BODY) -> NDArray[np.void]:
+    bodies = np.zeros(n, kind)
     bodies["id"] = np.arange(n)
     return bodies
 
@@ -167,15 +195,19 @@ class _Scene:
     method: str
     reach: float
     row: bool
+    period: float = 0.0
     built: _physics.ImpactScene | None = field(default=None, init=False)
     dt: float = field(default=0.0, init=False)
+
+    def build(self, dt: float) -> _physics.ImpactScene:
+        bodies = self.bodies.view(float).reshape(len(self.bodies), -1)
+        return _physics.ImpactScene(dt, self.theta, self.sweeps, self.method, self.materials, np.array(self.pairs, dtype=float), bodies,
+                                    self.planes, self.drums, self.reach, self.row, self.period)
 
     def at(self, dt: float) -> _physics.ImpactScene:
         dt = float(numbers("dt", dt, "s", low=0.0, low_open=True))
         if self.built is None:
-            bodies = self.bodies.view(float).reshape(len(self.bodies), -1)
-            self.built = _physics.ImpactScene(dt, self.theta, self.sweeps, self.method, self.materials, np.array(self.pairs, dtype=float),
-                                              bodies, self.planes, self.drums, self.reach, self.row)
+            self.built = self.build(dt)
             self.dt = dt
         elif dt != self.dt:
             raise ValueError(f"dt must stay {self.dt:g} s, as the system began, not {dt:g}")
@@ -191,14 +223,14 @@ class _Scene:
         steps = round(float(numbers("duration", duration, "s", low=0.0)) / self.dt)
         if int(every) < 1:
             raise ValueError(f"every must be >= 1 steps, not {every}")
-        time, position, velocity, spin, report, force, impacts = scene.run(
+        time, position, velocity, spin, orientation, report, force, impacts = scene.run(
             steps, int(every), [c[0] for c in columns], [c[1] for c in columns])
         named = dict(zip(_REPORT, report.T.copy(), strict=True))
         cut = (slice(None), slice(None), 0) if dimension == 1 else (slice(None), slice(None), slice(0, dimension))
         return ImpactMotion(
             time, position[cut], velocity[cut], spin if dimension == 3 else spin[:, :, 2], force,
             [_impact(row) for row in impacts.tolist()],
-            named["kinetic_energy"], named["elastic_energy"], named["dissipated_energy"], named)
+            named["kinetic_energy"], named["elastic_energy"], named["dissipated_energy"], named, orientation)
 
 
 class ImpactChain:
@@ -244,10 +276,10 @@ class ImpactChain:
                 continue
             place, hard = wall if isinstance(wall, tuple) else (wall, np.inf)
             walls.append([_wall_key(number), 0, float(numbers(f"{name} stiffness", hard, "N/m", low=0.0, low_open=True, infinite=True)),
-                          float(numbers(name, place, "m")), 0, 0, side, 0, 0, 0, 0, 0])
+                          float(numbers(name, place, "m")), 0, 0, side, 0, 0, 0, 0, 0, 0])
         count = len(materials)
         law = _pair_law(_law(None), 1.0, float(numbers("contact_damping", contact_damping, "N s/m", low=0.0)))
-        self._scene = _Scene(bodies, materials, [law] * (count * count), np.array(walls, dtype=float).reshape(-1, 12),
+        self._scene = _Scene(bodies, materials, [law] * (count * count), np.array(walls, dtype=float).reshape(-1, 13),
                              np.zeros((0, 11)), _theta(theta), 1, method, 0.0, True)
         self._columns = [(0, _wall_key(0)), *((i, i + 1) for i in range(n - 1)), (n - 1, _wall_key(1))]
 
@@ -265,7 +297,7 @@ class ImpactChain:
 
 
 def _walls(walls: Sequence[Plane | Drum], materials: int) -> tuple[Floats, Floats]:
-    """Rows of the planes (p, 12) and the drums (d, 11), as the scene takes them; walls have materials after those of the bodies."""
+    """Rows of the planes (p, 13) and the drums (d, 11), as the scene takes them; walls have materials after those of the bodies."""
     planes, drums = [], []
     for number, wall in enumerate(walls):
         if not isinstance(wall, Plane | Drum):
@@ -273,21 +305,77 @@ def _walls(walls: Sequence[Plane | Drum], materials: int) -> tuple[Floats, Float
         hard = float(numbers("wall stiffness", wall.stiffness, "N/m", low=0.0, low_open=True, infinite=True))
         head = [_wall_key(number), materials + number, hard]
         if isinstance(wall, Drum):
-            centre = numbers("centre", wall.centre, "m")
-            if centre.shape != (2,):
-                raise ValueError(f"centre must have two components (m), not {wall.centre!r}")
             size = float(numbers("radius", wall.radius, "m", low=0.0, low_open=True))
-            drums.append([*head, *centre, 0, 0, 0, 1, size, float(numbers("omega", wall.omega, "rad/s"))])
+            drums.append([*head, *_three("centre", wall.centre, "m"), *_direction("axis", wall.axis), size,
+                          float(numbers("omega", wall.omega, "rad/s"))])
         else:
-            normal = _three("normal", wall.normal, "")
-            if not normal.any():
-                raise ValueError("normal must not be zero")
-            planes.append([*head, *_three("point", wall.point, "m"), *(normal / np.linalg.norm(normal)),
-                           *_three("velocity", wall.velocity, "m/s")])
-    return np.array(planes, dtype=float).reshape(-1, 12), np.array(drums, dtype=float).reshape(-1, 11)
+            planes.append([*head, *_three("point", wall.point, "m"), *_direction("normal", wall.normal),
+                           *_three("velocity", wall.velocity, "m/s"), float(numbers("omega", wall.omega, "rad/s"))])
+    return np.array(planes, dtype=float).reshape(-1, 13), np.array(drums, dtype=float).reshape(-1, 11)
 
 
-class ImpactSystem:
+def _along_z(wall: Plane | Drum) -> bool:
+    """Whether the wall and its motion are the same all along z."""
+    if isinstance(wall, Drum):
+        return not _direction("axis", wall.axis)[:2].any()
+    return bool(_direction("normal", wall.normal)[2] == 0.0 and wall.omega == 0.0)
+
+
+def _load(bodies: NDArray[np.void], force: ArrayLike | None, gravity: Sequence[float] | None, dimension: int) -> None:
+    """Sets the constant forces (N); an infinite mass has no weight."""
+    n, mass = len(bodies), bodies["mass"]
+    if force is not None:
+        bodies["force"] = vectors("force", force, "N", n, dimension)
+    if gravity is not None:
+        bodies["force"] += np.where(np.isinf(mass), 0.0, mass)[:, None] * vectors("gravity", gravity, "m/s^2", n, dimension)
+
+
+def _system_scene(bodies: NDArray[np.void], stiffness: ArrayLike, damping: ArrayLike, friction: Friction, tangential_ratio: float,
+                  walls: Sequence[Plane | Drum], theta: float, contact_damping: float, friction_sweeps: int, method: str,
+                  reach: float) -> _Scene:
+    """Arguments of the systems: as in ImpactSystem."""
+    if int(friction_sweeps) < 1:
+        raise ValueError(f"friction_sweeps must be >= 1, not {friction_sweeps}")
+    materials, bodies["material"] = _materials(stiffness, damping, len(bodies))
+    own = len(materials)
+    planes, drums = _walls(walls, own)
+    laws = [_law(friction)] * own + [_law(friction if wall.friction is None else wall.friction) for wall in walls]
+    count = own + len(walls)
+    ratio = float(numbers("tangential_ratio", tangential_ratio, "", low=0.0, low_open=True))
+    viscous = float(numbers("contact_damping", contact_damping, "N s/m", low=0.0))
+    # A wall's law holds with every body; walls do not touch each other.
+    pairs = [_pair_law(laws[max(i, j)], ratio, viscous) for i in range(count) for j in range(count)]
+    return _Scene(bodies, np.vstack([materials, np.tile([1.0, 0.0], (len(walls), 1))]), pairs, planes, drums, _theta(theta),
+                  int(friction_sweeps), method, float(numbers("reach", reach, "m", low=0.0)), False)
+
+
+class _System:
+    """What systems of bodies in the plane and in space have in common."""
+
+    _scene: _Scene
+    _dimension: int
+
+    def run(self, duration: float, dt: float, *, every: int = 1) -> ImpactMotion:
+        """Go on for `duration` (s) in steps of `dt` (s); samples the beginning, every `every`-th step and the end. dt must not change."""
+        return self._scene.run(duration, dt, every, self._dimension, [])
+
+    def contacts(self) -> list[dict[str, object]]:
+        """What the last instant was solved for: contacts with a force now or before, and pairs that the free motion could close. Of each
+        a, b (as in Impact), gap (m), normal_force (N), opening (m), tangential (N, on a), normal (towards a), point (m)."""
+        rows = np.asarray(self._scene.begun().contacts())
+        return [{"a": int(r[0]), "b": int(r[1]), "gap": float(r[5]), "normal_force": float(r[6]), "opening": float(r[13]),
+                 "tangential": r[7:10].copy(), "normal": r[2:5].copy(), "point": r[10:13].copy()} for r in rows]
+
+    def state(self) -> Floats:
+        """Everything needed to go on bit for bit."""
+        return np.asarray(self._scene.begun().state())
+
+    def restore(self, state: ArrayLike, dt: float) -> None:
+        """Go on from `state` of a system with the same bodies and walls; dt (s) as it had."""
+        self._scene.at(dt).restore(np.ascontiguousarray(state, dtype=float))
+
+
+class ImpactSystem(_System):
     """Logs in cross-section (positions with two components) or balls (three), with planes, a drum and friction.
 
     mass, radius : kg and m, a number or (b,); an infinite mass is held fast
@@ -332,42 +420,100 @@ class ImpactSystem:
                 bodies["spin"] = vectors("spin", spin, "rad/s", n, 3)
             else:
                 bodies["spin"][:, 2] = _each("spin", spin, "rad/s", n)
-        if force is not None:
-            bodies["force"] = vectors("force", force, "N", n, d)
-        if gravity is not None:
-            finite = np.where(np.isinf(m), 0.0, m)
-            bodies["force"] += finite[:, None] * vectors("gravity", gravity, "m/s^2", n, d)
-        if int(friction_sweeps) < 1:
-            raise ValueError(f"friction_sweeps must be >= 1, not {friction_sweeps}")
+        if d == 2 and not all(_along_z(wall) for wall in walls if isinstance(wall, Drum)):
+            raise ValueError("in the plane the axis of a drum must be along z")
+        _load(bodies, force, gravity, d)
+        self._scene = _system_scene(bodies, stiffness, damping, friction, tangential_ratio, walls, theta, contact_damping, friction_sweeps,
+                                    method, reach)
 
-        materials, bodies["material"] = _materials(stiffness, damping, n)
-        own = len(materials)
-        planes, drums = _walls(walls, own)
-        laws = [_law(friction)] * own + [_law(friction if wall.friction is None else wall.friction) for wall in walls]
-        count = own + len(walls)
-        ratio = float(numbers("tangential_ratio", tangential_ratio, "", low=0.0, low_open=True))
-        viscous = float(numbers("contact_damping", contact_damping, "N s/m", low=0.0))
-        # A wall's law holds with every body; walls do not touch each other.
-        pairs = [_pair_law(laws[max(i, j)], ratio, viscous) for i in range(count) for j in range(count)]
-        self._scene = _Scene(
-            bodies, np.vstack([materials, np.tile([1.0, 0.0], (len(walls), 1))]), pairs, planes, drums, _theta(theta),
-            int(friction_sweeps), method, float(numbers("reach", reach, "m", low=0.0)), False)
 
-    def run(self, duration: float, dt: float, *, every: int = 1) -> ImpactMotion:
-        """Go on for `duration` (s) in steps of `dt` (s); samples the beginning, every `every`-th step and the end. dt must not change."""
-        return self._scene.run(duration, dt, every, self._dimension, [])
+def _quaternions(orientation: ArrayLike | None, axis: ArrayLike | None, n: int) -> Floats:
+    """Unit quaternions (n, 4): as given, or of the shortest turn from z to `axis`."""
+    if orientation is not None and axis is not None:
+        raise ValueError("give orientation or axis, not both")
+    if orientation is not None:
+        q = numbers("orientation", orientation, "")
+        if q.shape not in ((n, 4), (4,)):
+            raise ValueError(f"orientation must have the shape ({n}, 4), not {q.shape}")
+        q = np.broadcast_to(q, (n, 4))
+    else:
+        u = vectors("axis", (0.0, 0.0, 1.0) if axis is None else axis, "", n, 3)
+        size = np.linalg.norm(u, axis=1, keepdims=True)
+        if not size.all():
+            raise ValueError("axis must not be zero")
+        x, y, z = (u / size).T
+        # Half of the way: the quaternion of twice the turn from z to the middle; of a half turn, about x.
+        q = np.where((1 + z > 1e-14)[:, None], np.stack([1 + z, -y, x, 0 * z], axis=1), [0.0, 1.0, 0.0, 0.0])
+    size = np.linalg.norm(q, axis=1, keepdims=True)
+    if not size.all():
+        raise ValueError("orientation must not be zero")
+    return q / size
 
-    def contacts(self) -> list[dict[str, object]]:
-        """What the last instant was solved for: contacts with a force now or before, and pairs that the free motion could close. Of each
-        a, b (as in Impact), gap (m), normal_force (N), opening (m), tangential (N, on a), normal (towards a), point (m)."""
-        rows = np.asarray(self._scene.begun().contacts())
-        return [{"a": int(r[0]), "b": int(r[1]), "gap": float(r[5]), "normal_force": float(r[6]), "opening": float(r[13]),
-                 "tangential": r[7:10].copy(), "normal": r[2:5].copy(), "point": r[10:13].copy()} for r in rows]
 
-    def state(self) -> Floats:
-        """Everything needed to go on bit for bit."""
-        return np.asarray(self._scene.begun().state())
+class CapsuleSystem(_System):
+    """Logs in space: solid capsules, cylinders with rounded ends, with planes, a drum and friction.
 
-    def restore(self, state: ArrayLike, dt: float) -> None:
-        """Go on from `state` of a system with the same bodies and walls; dt (s) as it had."""
-        self._scene.at(dt).restore(np.ascontiguousarray(state, dtype=float))
+    mass, radius : kg and m, > 0, a number or (b,); an infinite mass is held fast
+    length : m, >= 0, of the cylinder between the centres of the caps, a number or (b,); the log is longer by two radii
+    position, velocity : m and m/s, (b, 3), of the centres, at time 0
+    orientation : unit quaternions (w, x, y, z), (b, 4) or (4,), from the axes of the body, z along its own, to space
+    axis : instead of `orientation`, directions of the logs, (b, 3) or (3,); default: z
+    spin : rad/s, (b, 3), in space
+    stiffness : N/m, of one log at its boundary, a number or (b,); where a side lies on a side, each of the two points of contact has half
+    force : N, constant, (3,) for all or (b, 3)
+    gravity : m/s^2, (3,), adds mass times gravity to the force
+    inertia : kg m^2, (b, 2) or (2,), about the axis and across it; default: those of solid capsules, exact
+    period : m, everything repeats along z after this length; 0 = it does not. Positions may leave it. Walls must be the same all along z
+    friction, tangential_ratio, walls, theta, damping, contact_damping, friction_sweeps, method, reach : as in ImpactSystem
+
+    Two logs, or a log and a wall, have up to two points of contact, and each of them is a row of `contacts()` and has impacts of its own.
+    Starts with an overlap of more than a hundredth of the radius are refused. ValueError or TypeError: one line about the argument.
+
+    Model: G. N. Kolesnikov, Resources and Technology (2013); contacts of capsules: docs/theory/lcp.md.
+
+    >>> log = CapsuleSystem(40, 0.1, 1.0, [[0, 0, 0.3]], axis=(1, 0, 0.2), gravity=(0, 0, -9.81), contact_damping=1e4,
+    ...                     walls=[Plane(point=(0, 0, 0), normal=(0, 0, 1))])
+    >>> motion = log.run(2.0, 1e-3)
+    >>> [c["b"] for c in log.contacts()], round(sum(c["normal_force"] for c in log.contacts()), 1)
+    ([-1, -1], 392.4)
+    """
+
+    def __init__(self, mass: ArrayLike, radius: ArrayLike, length: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None, *,
+                 orientation: ArrayLike | None = None, axis: ArrayLike | None = None, spin: ArrayLike | None = None,
+                 stiffness: ArrayLike = 1e7, force: ArrayLike | None = None, gravity: Sequence[float] | None = None,
+                 inertia: ArrayLike | None = None, friction: Friction = 0.0, tangential_ratio: float = 2.0 / 7.0,
+                 walls: Sequence[Plane | Drum] = (), theta: float = 1.0, damping: ArrayLike = 0.0, contact_damping: float = 0.0,
+                 friction_sweeps: int = 2, method: str = "auto", reach: float = 0.0, period: float = 0.0) -> None:
+        x = numbers("position", position, "m")
+        if x.ndim != 2 or x.shape[0] == 0 or x.shape[1] != 3:
+            raise ValueError(f"position must have the shape (bodies, 3), not {x.shape}")
+        n, self._dimension = x.shape
+        bodies = _bodies(n, _CAPSULE)
+        m = bodies["mass"] = _each("mass", mass, "kg", n, low=0.0, low_open=True, infinite=True)
+        r = bodies["radius"] = _each("radius", radius, "m", n, low=0.0, low_open=True)
+        bodies["length"] = _each("length", length, "m", n, low=0.0)
+        if inertia is None:
+            bodies["axial_inertia"], bodies["inertia"] = np.full((2, n), np.inf)
+            finite = np.isfinite(m)
+            own = _physics.capsule_inertia(m[finite], r[finite], bodies["length"][finite])
+            bodies["axial_inertia"][finite], bodies["inertia"][finite] = np.asarray(own).T
+        else:
+            given = numbers("inertia", inertia, "kg m^2", low=0.0, low_open=True)
+            if given.shape not in ((n, 2), (2,)):
+                raise ValueError(f"inertia must have the shape ({n}, 2), not {given.shape} (kg m^2)")
+            bodies["axial_inertia"], bodies["inertia"] = np.broadcast_to(given, (n, 2)).T
+        bodies["position"] = x
+        bodies["orientation"] = _quaternions(orientation, axis, n)
+        for name, value, unit in (("velocity", velocity, "m/s"), ("spin", spin, "rad/s")):
+            if value is not None:
+                bodies[name] = vectors(name, value, unit, n, 3)
+        _load(bodies, force, gravity, 3)
+        self._scene = _system_scene(bodies, stiffness, damping, friction, tangential_ratio, walls, theta, contact_damping, friction_sweeps,
+                                    method, reach)
+        self._scene.period = float(numbers("period", period, "m", low=0.0))
+        if self._scene.period and not all(map(_along_z, walls)):
+            raise ValueError("with a period all walls must be the same along z")
+        a, b, part = self._scene.build(1.0).worst_overlap()
+        if part > 0.01:
+            partner = f"wall {-b}" if b < 0 else f"body {b}"
+            raise ValueError(f"body {a} and {partner} overlap at the start by {part:.3g} of the radius; at most 0.01 is allowed")

@@ -1,0 +1,68 @@
+// Orientation of bodies, and their free rotation.
+#pragma once
+
+#include <cmath>
+#include <tuple>
+
+#include "../vec3.hpp"
+
+namespace dembark {
+namespace impact {
+
+/// Of a rotation; unit.
+struct Quaternion {
+  double w = 1.0, x = 0.0, y = 0.0, z = 0.0;
+
+  Vec3<double> turned(const Vec3<double>& v) const {
+    const Vec3<double> q{x, y, z}, t = 2.0 * cross(q, v);
+    return v + w * t + cross(q, t);
+  }
+  auto fields() { return std::tie(w, x, y, z); }
+};
+
+/// First q, then p.
+inline Quaternion operator*(const Quaternion& p, const Quaternion& q) {
+  return {p.w * q.w - p.x * q.x - p.y * q.y - p.z * q.z, p.w * q.x + p.x * q.w + p.y * q.z - p.z * q.y,
+          p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x, p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w};
+}
+
+/// About the direction of `turn` by its length (rad).
+inline Quaternion rotation_by(const Vec3<double>& turn) {
+  const double angle = norm(turn), part = angle > 0.0 ? std::sin(0.5 * angle) / angle : 0.5;
+  return {std::cos(0.5 * angle), part * turn.x, part * turn.y, part * turn.z};
+}
+
+inline Quaternion normalised(const Quaternion& q) {
+  const double part = 1.0 / std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+  return {part * q.w, part * q.x, part * q.y, part * q.z};
+}
+
+/// Of a body with a moment of inertia `axial` about its axis u (unit) and `across` at right angles to it (kg m^2).
+struct SymmetricInertia {
+  double axial, across;
+
+  /// Angular momentum (kg m^2/s) of the spin (rad/s).
+  Vec3<double> momentum(const Vec3<double>& spin, const Vec3<double>& u) const {
+    return across * spin + ((axial - across) * dot(spin, u)) * u;
+  }
+  /// Spin (rad/s) with the angular momentum.
+  Vec3<double> spin(const Vec3<double>& momentum, const Vec3<double>& u) const {
+    return (1.0 / across) * momentum + ((1.0 / axial - 1.0 / across) * dot(momentum, u)) * u;
+  }
+  /// J
+  double energy(const Vec3<double>& spin, const Vec3<double>& u) const {
+    const double along = dot(spin, u);
+    return 0.5 * (across * dot(spin, spin) + (axial - across) * along * along);
+  }
+};
+
+/// Orientation after free rotation for dt (s) of a body whose axis is its z; exact. The axis turns about the angular momentum
+/// (kg m^2/s), which stays, with |L| / across, and the body about its axis with (1 / axial - 1 / across) L u on top.
+inline Quaternion rotated_freely(const SymmetricInertia& inertia, double dt, const Vec3<double>& momentum, const Quaternion& orientation) {
+  const Vec3<double> z{0.0, 0.0, 1.0};
+  const double own = (1.0 / inertia.axial - 1.0 / inertia.across) * dot(momentum, orientation.turned(z));
+  return normalised(rotation_by((dt / inertia.across) * momentum) * orientation * rotation_by((dt * own) * z));
+}
+
+}  // namespace impact
+}  // namespace dembark
