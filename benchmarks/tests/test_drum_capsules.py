@@ -1,0 +1,45 @@
+"""The drum of logs in space: its filling, its starts, and what is measured on a motion that is known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks import drum_capsules as drum
+
+
+def test_logs_fill_the_drum_as_said() -> None:
+    r, length, mass = drum.logs(300)
+    assert (length + 2 * r == pytest.approx(drum.TOTAL))
+    volume = math.pi * r**2 * length + 4 / 3 * math.pi * r**3
+    assert mass == pytest.approx(drum.DENSITY * volume)
+    assert volume.sum() / (math.pi * drum.RADIUS**2 * drum.drum_length(300)) == pytest.approx(drum.FILLING)
+    assert 6.5 < np.mean(drum.TOTAL / (2 * r)) < 7.6
+
+
+@pytest.mark.parametrize("slope", [None, 2.0])
+def test_free_fall_along_the_slope(slope: float | None) -> None:
+    """Starts without overlap, and before anything touches the speed along the drum is that of the slope."""
+    motion = drum.space(150, slope).run(0.01, drum.STEP, every=5)
+    fall = drum.GRAVITY * math.sin(math.radians(slope or 0.0))
+    found = drum.along(motion)
+    assert found["axial_speed"][0] == pytest.approx(0.5 * fall * 0.01, abs=1e-9)
+    assert found["tilt"][0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_as_many_discs_as_logs_start_without_overlap() -> None:
+    discs, speed = drum.section(100)
+    motion = discs.run(2e-4, drum.STEP)
+    assert motion.report["active"].max() == 0
+    assert speed < drum.SPEED * 1.1
+
+
+def test_too_many_logs_are_refused() -> None:
+    with pytest.raises(ValueError, match="1000 logs do not fit into the drum"):
+        drum.places(1000, 1.0, 2)
+
+
+def test_intervals_are_those_of_quarters_of_a_revolution() -> None:
+    mean, half = drum.interval(np.repeat([1.0, 3.0], drum.SAMPLES // 2))
+    assert mean == pytest.approx(2.0)
+    assert half == pytest.approx(3.182 * math.sqrt(4 / 3) / 2, rel=1e-3)
