@@ -55,7 +55,8 @@ class Scene {
   /// that ratio, 0 where nothing overlaps.
   std::pair<Key, double> worst_overlap() {
     std::vector<Contact> contacts;
-    find(0.0, contacts);
+    if (row) row_contacts(contacts);
+    else find(0.0, contacts);
     std::pair<Key, double> worst{};
     for (const Contact& c : contacts) {
       const double a = bodies_[std::size_t(c.a)].radius, radius = c.b >= 0 ? std::min(a, bodies_[std::size_t(c.b)].radius) : a;

@@ -29,6 +29,9 @@ _CAPSULE = np.dtype([*_BODY.descr, ("axial_inertia", float), ("length", float), 
 _REPORT = ("contacts", "active", "impacts_begun", "peak_force", "impulse_sum", "dissipated_energy", "elastic_energy", "pivots",
            "block_steps", "pivots_total", "certificate", "worst_certificate", "peak_force_so_far", "kinetic_energy")
 
+# Of two bodies at the start, over the smaller radius.
+MOST_OVERLAP = 0.01
+
 
 @dataclass(frozen=True)
 class Impact:
@@ -218,6 +221,13 @@ class _Scene:
             raise RuntimeError("nothing has been run yet: call run(duration, dt) first")
         return self.built
 
+    def check_start(self) -> None:
+        """ValueError for bodies whose contact would throw them apart; loads at rest overlap by mg/k."""
+        a, b, part = self.build(1.0).worst_overlap()
+        if part > MOST_OVERLAP:
+            partner = f"wall {-b}" if b < 0 else f"body {b}"
+            raise ValueError(f"body {a} and {partner} overlap at the start by {part:.3g} of the radius; at most {MOST_OVERLAP:g} is allowed")
+
     def run(self, duration: float, dt: float, every: int, dimension: int, columns: Sequence[tuple[int, int]]) -> ImpactMotion:
         scene = self.at(dt)
         steps = round(float(numbers("duration", duration, "s", low=0.0)) / self.dt)
@@ -245,6 +255,8 @@ class ImpactChain:
     theta : 1 = backward differences, the published scheme, with the restitution exp(-pi omega dt / 2); 1/2 = without that loss
     damping : N s/m, a number or (b,), on the absolute velocity of logs in contact
     contact_damping : N s/m, on the deformation of a contact; Galilean invariant
+
+    A start with an overlap of more than a hundredth of the smaller radius is refused. ValueError or TypeError: one line about the argument.
 
     >>> row = ImpactChain([20, 80], [1e7, 3e7], [0, 1e-5], [1.5, 0])
     >>> motion = row.run(0.01, 1.46e-6)
@@ -281,6 +293,7 @@ class ImpactChain:
         law = _pair_law(_law(None), 1.0, float(numbers("contact_damping", contact_damping, "N s/m", low=0.0)))
         self._scene = _Scene(bodies, materials, [law] * (count * count), np.array(walls, dtype=float).reshape(-1, 13),
                              np.zeros((0, 11)), _theta(theta), 1, method, 0.0, True)
+        self._scene.check_start()
         self._columns = [(0, _wall_key(0)), *((i, i + 1) for i in range(n - 1)), (n - 1, _wall_key(1))]
 
     def run(self, duration: float, dt: float, *, every: int = 1) -> ImpactMotion:
@@ -391,6 +404,8 @@ class ImpactSystem(_System):
     theta, damping, contact_damping : as in ImpactChain
     friction_sweeps : friction and normal forces are computed in turn so many times a step
     reach : m, gap up to which a pair is a candidate; 0 = as large as the motion of each step asks for
+
+    A start with an overlap of more than a hundredth of the smaller radius is refused. ValueError or TypeError: one line about the argument.
     """
 
     def __init__(self, mass: ArrayLike, radius: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None, *,
@@ -425,6 +440,7 @@ class ImpactSystem(_System):
         _load(bodies, force, gravity, d)
         self._scene = _system_scene(bodies, stiffness, damping, friction, tangential_ratio, walls, theta, contact_damping, friction_sweeps,
                                     method, reach)
+        self._scene.check_start()
 
 
 def _quaternions(orientation: ArrayLike | None, axis: ArrayLike | None, n: int) -> Floats:
@@ -513,7 +529,4 @@ class CapsuleSystem(_System):
         self._scene.period = float(numbers("period", period, "m", low=0.0))
         if self._scene.period and not all(map(_along_z, walls)):
             raise ValueError("with a period all walls must be the same along z")
-        a, b, part = self._scene.build(1.0).worst_overlap()
-        if part > 0.01:
-            partner = f"wall {-b}" if b < 0 else f"body {b}"
-            raise ValueError(f"body {a} and {partner} overlap at the start by {part:.3g} of the radius; at most 0.01 is allowed")
+        self._scene.check_start()
