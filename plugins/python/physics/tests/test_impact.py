@@ -162,7 +162,7 @@ def test_runs_in_pieces_are_one_run():
 def test_every_method_gives_the_same_forces():
     forces = []
     for method in ("auto", "energy", "block", "murty"):
-        s = ImpactSystem(20.0, 0.1, [[0, 0.1], [0.19, 0.1], [0.095, 0.26]], gravity=(0, -G), method=method,
+        s = ImpactSystem(20.0, 0.1, [[0, 0.1], [0.1992, 0.1], [0.0996, 0.2725]], gravity=(0, -G), method=method,
                          walls=[Plane(point=(0, 0), normal=(0, 1))])
         s.run(2e-3, 1e-4)
         forces.append([c["normal_force"] for c in s.contacts()])
