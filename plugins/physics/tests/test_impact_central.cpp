@@ -98,7 +98,7 @@ TEST_CASE("the unequal pair: published numbers") {
 }
 
 TEST_CASE("a row without logs touches no plane") {
-  Scene scene(settings(1e-6, 1.0, {2e7}), {});
+  Scene scene(settings(1e-6, 1.0, {2e7}), std::vector<Body>());
   scene.row = true;
   scene.around.planes.push_back({});
   scene.run(2);
