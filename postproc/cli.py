@@ -369,6 +369,8 @@ def tracks(
     between = lags(diffusion) if diffusion else None
     measured = tracking.read_csv(against) if against else None
     if source.suffix == ".csv":
+        if contacts or time_step or density or columns or contact_columns or units:
+            raise DembarkError(f"{source} is a file of tracks", "", "leave out what describes dumps, such as --contacts and --time-step")
         found, notes = tracking.read_csv(source).of(ids), []
         found = found.at(frame_numbers(frames, len(found.times)))
     else:
@@ -379,7 +381,8 @@ def tracks(
             found = tracking.follow(chosen, ids, advance)
         notes = chosen.lines([])
     seen = [found] if measured is None else tracking.common(found, measured)
-    movements = {one.name: tracking.measure(one, interval or (measured.interval if measured else None), between) for one in seen}
+    time, ends = interval or (measured.interval if measured else None), between or tracking.usual_lags(*seen)
+    movements = {one.name: tracking.measure(one, time, ends) for one in seen}
     written = []
     if out:
         if out.suffix == ".csv":

@@ -27,7 +27,9 @@ def lines(seen: Sequence[Tracks], movements: Mapping[str, Movement]) -> list[str
         one = movements[tracks.name]
         frames = np.isfinite(tracks.positions).all(axis=2)
         lost = f", {int((~frames).any(axis=0).sum())} of them not in all frames" if not frames.all() else ""
-        found.append(f"{tracks.name}: {len(tracks.ids)} grains{lost}; {len(tracks.times)} frames, {1e3 * tracks.interval:.4g} ms apart")
+        found.append(f"{tracks.name}: {len(tracks.ids)} grains{lost}; {len(tracks.times)} frames, {1e3 * tracks.interval:.4g} ms apart; "
+                     f"velocities over {1e3 * one.interval:.4g} ms, self-diffusion between {1e3 * one.between[0]:.4g} and "
+                     f"{1e3 * one.between[1]:.4g} ms")
         for name, (label, unit) in LABELS.items():
             values = "; ".join(f"{axis} {_shown(value)}" for axis, value in zip(one.axes, getattr(one, name), strict=True))
             found.append(f"  {label}: {values}{unit and ' '}{unit}")

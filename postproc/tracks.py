@@ -37,6 +37,8 @@ OTHERS = {**{f"{letter}{axis}": (unit, f"{name} along {axis}") for letter, unit,
     "contacts": ("1", "number of contacts with grains"), "contact_force": ("N", "sum of the forces of these contacts")}
 _HEAD = re.compile(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*")
 _LEAST = 8  # displacements of which a scatter is measured
+# Frames over those in which any grain was seen.
+_MOST_GAPS = 100
 
 
 @dataclass(frozen=True)
@@ -120,8 +122,11 @@ class Tracks:
                        others={name: values[frames] for name, values in self.others.items()})
 
     def lag(self, time: float) -> int:
-        """The frames that come next to a time (s), at least one; DembarkError where the tracks are shorter."""
+        """The frames in a time (s); DembarkError where it is no multiple of the interval, by more than 1 %, or the tracks are shorter."""
         frames = max(1, round(time / self.interval))
+        if abs(frames * self.interval - time) > 0.01 * time:
+            raise DembarkError(f"{self.name}: {time:g} s are no multiple of its {self.interval:.4g} s between frames", "",
+                               "give an --interval and --diffusion that fit")
         if frames >= len(self.times):
             raise DembarkError(f"{self.name}: a lag of {time:g} s is not within {self.times[-1] - self.times[0]:.4g} s")
         return frames
@@ -159,12 +164,14 @@ def diffusion(tracks: Tracks, lags: tuple[float, float], axis: int) -> Estimate:
 
 @dataclass(frozen=True)
 class Movement:
-    """What `measure` finds, along each of the `axes`: `velocity`, mean (m/s); `fluctuation`, root mean square about it (m/s), and
-    `flatness`, fourth moment over that of a Gaussian distribution: 1 of it; both of displacements over one frame. `coefficient` (m2/s):
-    self-diffusion. `lags` (k,) in s and `squares` (k, c) in m2: mean square displacements about the mean; `speeds`: velocities over one
-    frame, (m, c) in m/s."""
+    """What `measure` finds, along each of the `axes`, of displacements over the `interval` (s): `velocity`, mean (m/s); `fluctuation`, root
+    mean square about it (m/s), and `flatness`, fourth moment over that of a Gaussian distribution: 1 of it. `coefficient` (m2/s):
+    self-diffusion `between` two lags (s). `lags` (k,) in s and `squares` (k, c) in m2: mean square displacements about the mean;
+    `speeds`: velocities over the interval, (m, c) in m/s."""
 
     axes: str
+    interval: float
+    between: tuple[float, float]
     velocity: Sequence[Estimate]
     fluctuation: Sequence[Estimate]
     flatness: Sequence[Estimate]
@@ -174,10 +181,16 @@ class Movement:
     speeds: Array
 
 
+def usual_lags(*tracks: Tracks) -> tuple[float, float]:
+    """A tenth and four tenths of the time of the shortest of some tracks (s), as whole frames of that with the longest interval."""
+    length, interval = min(float(one.times[-1] - one.times[0]) for one in tracks), max(one.interval for one in tracks)
+    short = max(1, round(0.1 * length / interval))
+    return short * interval, max(short + 1, round(0.4 * length / interval)) * interval
+
+
 def measure(tracks: Tracks, interval: float | None = None, lags: tuple[float, float] | None = None) -> Movement:
     """Measure tracks; velocities are those over `interval` (s; default: one frame), the diffusion that between two `lags` (s; default: a
     tenth and four tenths of the time). DembarkError for lags that the tracks do not have."""
-    length = float(tracks.times[-1] - tracks.times[0])
     frames = 1 if interval is None else tracks.lag(interval)
     time, moves = frames * tracks.interval, tracks.displacements(frames)
     speeds, blocks = moves.moves / time, moves.blocks()
@@ -188,8 +201,8 @@ def measure(tracks: Tracks, interval: float | None = None, lags: tuple[float, fl
 
     known = np.unique(np.geomspace(1, max(1, len(tracks.times) // 2), 20).astype(int))
     squares = np.array([tracks.displacements(int(lag)).scatter for lag in known])
-    ends = lags or (0.1 * length, 0.4 * length)
-    return Movement(tracks.axes, over(lambda v: float(v.mean())), over(lambda v: float(v.std())), over(_flatness),
+    ends = lags or usual_lags(tracks)
+    return Movement(tracks.axes, time, ends, over(lambda v: float(v.mean())), over(lambda v: float(v.std())), over(_flatness),
                     [diffusion(tracks, ends, axis) for axis in range(len(tracks.axes))], known * tracks.interval, squares, speeds)
 
 
@@ -295,7 +308,7 @@ def read_csv(path: Path) -> Tracks:
     if (table["grain"] != np.round(table["grain"])).any():
         raise DembarkError(f"{path}: a number of a grain is no integer")
     ids, of_grain = np.unique(table["grain"].astype(np.int64), return_inverse=True)
-    times, of_time = _equal_times(table["time"])
+    times, of_time = _frames(table["time"], table["grain"])
     cells = of_time * len(ids) + of_grain
     if len(np.unique(cells)) < len(cells):
         twice = int(cells[np.argmax(np.bincount(cells)[cells] > 1)])
@@ -325,12 +338,21 @@ def _heads(words: Sequence[str], path: Path) -> dict[str, tuple[int, float]]:
     return found
 
 
-def _equal_times(values: Array) -> tuple[Array, NDArray[np.intp]]:
-    """The times, each once, and which of them each value is; those apart by less than a thousandth of the usual interval are one."""
+def _frames(values: Array, grains: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Times of the frames, and which of them each of the `values` is. Values apart by less than a thousandth of the usual interval of a
+    grain are one. Frames in which no grain was seen are there, too, when all intervals are multiples of the shortest."""
     times, which = np.unique(values, return_inverse=True)
-    apart = np.diff(times)
-    new = np.concatenate([[True], apart > 1e-3 * np.median(apart)]) if len(apart) else np.ones(1, bool)
-    return times[new], (np.cumsum(new) - 1)[which]
+    order = np.lexsort((values, grains))
+    apart = np.diff(values[order])[np.diff(grains[order]) == 0.0]
+    usual = float(np.median(apart)) if len(apart) else 0.0
+    new = np.concatenate([[True], np.diff(times) > 1e-3 * usual])
+    times, which = times[new], (np.cumsum(new) - 1)[which]
+    steps = np.diff(times)
+    parts = np.round(steps / steps.min()) if len(steps) else steps
+    if len(steps) and parts.max() > 1.0 and np.abs(steps / steps.min() - parts).max() < 0.01 and parts.sum() < _MOST_GAPS * len(times):
+        place = np.concatenate([[0], np.cumsum(parts)]).astype(np.intp)
+        return np.linspace(times[0], times[-1], place[-1] + 1), place[which]
+    return times, which
 
 
 def write_csv(path: Path, tracks: Tracks) -> Path:
@@ -339,8 +361,7 @@ def write_csv(path: Path, tracks: Tracks) -> Path:
     frame, grain = np.nonzero(np.isfinite(tracks.positions).all(axis=2))
     columns = [tracks.times[frame], tracks.ids[grain], *tracks.positions[frame, grain].T,
                *(tracks.others[name][frame, grain] for name in names[2 + len(tracks.axes):])]
-    integers = {"grain", "contacts"}
-    forms = ["%d" if name in integers else "%.10g" for name in names]
+    forms = ["%d" if name == "grain" else "%.10g" for name in names]
     text = io.StringIO()
     text.write(",".join(names) + "\n")
     np.savetxt(text, np.column_stack(columns), fmt=forms, delimiter=",")

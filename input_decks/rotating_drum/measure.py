@@ -30,6 +30,8 @@ ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, 
 SEEN = {"drum_radius": 0.042, "drum_depth": 0.02, "solid_filling": 0.262}
 # 95 % limits over the standard uncertainty.
 CONFIDENT = 1.96
+# Standard uncertainty (m) of the height of the surface in the images, as in the fit to it.
+READING = 7.5e-4
 
 
 def tracked_profile() -> tuple[Array, Array]:
@@ -83,9 +85,10 @@ def other_code() -> dict[str, dict[str, float]]:
 def seen(speed: float) -> tuple[dict[str, Estimate], Array] | None:
     """What images show of the drum that turns with `speed` (rad/s): quantities, and its surface as rows x, y, lower and upper level (m);
     None for a speed that was not published."""
-    rpm = f"{speed * 30.0 / math.pi:.0f}"
+    turns = speed * 30.0 / math.pi
+    rpm = f"{turns:.0f}"
     rows = reference_rows(HERE / "granudrum.csv", rpm=rpm)
-    if not rows:
+    if not rows or abs(turns - round(turns)) > 0.01 * turns:
         return None
     surface = [[*map(row.number, ("x", "y", "low", "high"))] for row in reference_rows(HERE / "granudrum_surface.csv", rpm=rpm)]
     found = {row["quantity"]: Estimate(row.number("value"), CONFIDENT * row.number("uncertainty"), "reading of the image") for row in rows}
@@ -111,7 +114,7 @@ def surfaces(views: list[SideView], data: Array | None) -> Curve:
     if data is None:
         return profile("side_surface", title, along, across, place, values)
     return profile("side_surface", title, along, across, place, values, reference=data[:, 1],
-                   reference_half=0.5 * (data[:, 3] - data[:, 2]), reference_label="ACCES-GranuDrum images")
+                   reference_half=np.full(len(place), CONFIDENT * READING), reference_label="ACCES-GranuDrum images")
 
 
 def measure(replicas: Replicas) -> Measurement:

@@ -125,9 +125,28 @@ def test_a_file_of_tracks_gives_them_back(tmp_path_factory, grains, frames, axes
     tracks = Tracks(np.arange(10, 10 + grains), 0.5 * np.arange(frames), places, "".join(sorted(axes)), {"vx": np.where(seen, 0.5, np.nan)})
     found = read_csv(write_csv(tmp_path_factory.mktemp("tracks") / "a.csv", tracks))
     assert found.axes == tracks.axes and found.ids.tolist() == tracks.ids[grain].tolist()
-    assert found.times == pytest.approx(tracks.times[kept])
-    assert found.positions == pytest.approx(places[kept][:, grain], abs=1e-9, nan_ok=True)
-    assert np.array_equal(found.others["vx"], tracks.others["vx"][kept][:, grain], equal_nan=True)
+    # Frames in which nothing was seen may be there.
+    at = np.abs(found.times[:, None] - tracks.times[kept]).argmin(axis=0)
+    assert found.times[at] == pytest.approx(tracks.times[kept])
+    assert found.positions[at] == pytest.approx(places[kept][:, grain], abs=1e-9, nan_ok=True)
+    assert np.array_equal(found.others["vx"][at], tracks.others["vx"][kept][:, grain], equal_nan=True)
+    assert np.isnan(np.delete(found.positions, at, axis=0)).all()
+
+
+def test_lost_frames_and_jitter_leave_equal_intervals(tmp_path):
+    rows = [f"{0.01 * k + 1e-9 * (grain * k % 3)},{grain},{k},0" for k in range(20) if k not in (4, 5, 11) for grain in range(4)]
+    (tmp_path / "camera.csv").write_text("\n".join(["time,grain,x,z", *rows]))
+    found = read_csv(tmp_path / "camera.csv")
+    assert len(found.times) == 20 and found.interval == pytest.approx(0.01, rel=1e-6)
+    assert np.isnan(found.positions[[4, 5, 11]]).all() and found.positions[6, :, 0].tolist() == [6.0] * 4
+
+
+def test_times_that_are_no_frames_are_refused():
+    tracks = Tracks(np.arange(3), 0.005 * np.arange(50), np.random.default_rng(1).normal(size=(50, 3, 2)), "xz")
+    assert tracks.lag(0.01) == 2
+    for time in (0.002, 0.008):
+        with pytest.raises(DembarkError, match=r"no multiple of its 0\.005 s between frames"):
+            tracks.lag(time)
 
 
 def test_units_stand_in_the_header(tmp_path):

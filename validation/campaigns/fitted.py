@@ -42,8 +42,8 @@ class FittedParameters:
         if count > len(self.samples):
             raise DembarkError(f"{count} members", f"{self.path} has {len(self.samples)} samples", "ask for fewer")
         order = random.Random(0).sample(range(len(self.samples)), len(self.samples))
-        whole = {name for name in self.samples[0] if case.parameters[name].is_whole}
-        return [{**self.fixed, **changes, **{name: round(value) if name in whole else value for name, value in self.samples[k].items()}}
+        integers = {name for name in self.samples[0] if case.parameters[name].is_whole}
+        return [{**self.fixed, **changes, **{name: round(value) if name in integers else value for name, value in self.samples[k].items()}}
                 for k in order[:count]]
 
 
@@ -57,7 +57,8 @@ def read(path: Path) -> FittedParameters:
     that were written with it."""
     data = load_toml(path)
     given, sweep = data.get("posterior"), (data.get("sweeps") or [{}])[0]
-    if not isinstance(given, Mapping) or not {"file", "sha256", "targets"} <= given.keys():
+    complete = isinstance(sweep, Mapping) and {"case", "profile", "variant", "engines"} <= sweep.keys()
+    if not complete or not isinstance(given, Mapping) or not {"file", "sha256", "targets"} <= given.keys():
         raise DembarkError(f"{path} has no table [posterior]", "", "give the fitted.toml that 'dembark calibrate' wrote")
     table = path.parent / str(given["file"])
     try:

@@ -154,6 +154,8 @@ def series(case: Case, variant: str, profile: str | None, engine: Engine, change
 def predicted(case: Case, variant: str, profile: str, engine: Engine, fitted: FittedParameters, count: int,
               changes: Mapping[str, Value] | None = None) -> Series:
     """`count` runs, each with a draw of the posterior of `fitted` and, where the case has packings, a packing of its own."""
+    if "replicas" in (changes or {}):
+        raise DembarkError("replicas is set", "each member has a packing of its own", "set their number with --members")
     packings = {"replicas": count} if "replicas" in case.parameters else {}
     drawn = [series(case, variant, profile, engine, {**one, **packings}) for one in fitted.members(case, count, changes or {})]
     return Series(tuple(replace(one.runs[0], replica=k, values=for_replica(one.runs[0].values, k), fitted=fitted.facts)

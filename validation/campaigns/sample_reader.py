@@ -107,7 +107,7 @@ class SampleReader(TableReader):
             if "at" in given:
                 return self.curve(place, name, given, found)
             value, own = targets.one_number(found, given["value"], unit), given["uncertainty"]
-            deviation = targets.one_number(found, own, unit) if isinstance(own, str) else float(own)
+            deviation = targets.one_number(found, own, unit) if isinstance(own, str) else finite(float(own), f"uncertainty of {name}")
             return self.positive(place, name, Target(value, deviation, found.path))
         except DembarkError as error:
             raise error if f"[{place}]" in str(error) else self.fail(place, str(error)) from None
@@ -120,9 +120,11 @@ class SampleReader(TableReader):
 
     def curve(self, place: str, name: str, given: Mapping[str, Any], found: Table) -> CurveTarget:
         """The target `name` that is a curve."""
-        if given["correlation"] < 0.0:
-            raise self.fail(place, f"correlation of {name} = {given['correlation']:g} is out of range", "it must be >= 0")
-        return targets.curve(found, given["at"], given["value"], given["uncertainty"], float(given["correlation"]))
+        own, correlation = given["uncertainty"], self.quantity(place, given["correlation"], "1", f"correlation of {name}")
+        if correlation < 0.0:
+            raise self.fail(place, f"correlation of {name} = {correlation:g} is out of range", "it must be >= 0")
+        deviation = own if isinstance(own, str) else finite(float(own), f"uncertainty of {name}")
+        return targets.curve(found, given["at"], given["value"], deviation, correlation)
 
     def quantity(self, table: str, given: Any, unit: str, name: str) -> float:
         """A finite number in `unit`; `name` is what it was given for."""

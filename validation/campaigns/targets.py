@@ -13,6 +13,7 @@ from typing import Any
 from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
 from dembark.common.units import to_si
+from dembark.validation.judge.result import PLAN
 
 # Copies of the tables of a campaign, next to the copy of its file.
 FOLDER = "targets"
@@ -105,8 +106,9 @@ def _same(text: str | None, wanted: Any) -> bool:
 def find(name: str, campaign: Path, case: Path) -> Path:
     """The table `name`: its copy in a campaign's folder, or next to the file of the `campaign`, or among the references in the folder of
     the `case`; DembarkError when there is none."""
-    # A copy first: what was begun goes on with what it began with.
-    places = [campaign.parent / FOLDER / Path(name).name, campaign.parent / name, case / REFERENCE / name]
+    # A copy first in the folder of a campaign: what was begun goes on with what it began with.
+    copies = [campaign.parent / FOLDER / Path(name).name] if (campaign.parent / PLAN).is_file() else []
+    places = [*copies, campaign.parent / name, case / REFERENCE / name]
     for path in places:
         if path.is_file():
             return path

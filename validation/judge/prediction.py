@@ -20,7 +20,7 @@ from dembark.validation.case.model import Case
 
 from .result import QuantityRecord
 
-# Numbers of a run that do not make it another experiment.
+# Numbers of a run that do not make it another experiment, whatever its variant is.
 _CHANCE = {"seed", "replicas"}
 _MEASURED = ("experiment", "code")
 SAMPLED = "a point of the sample of a calibration"
@@ -64,7 +64,8 @@ def _value(case: Case, name: str, value: Value, members: Sequence[Value], count:
 def _curve(curve: Mapping[str, Any], members: Sequence[Measurement]) -> Mapping[str, Any]:
     own = [one for member in members for one in member.profiles if one["name"] == curve["name"]]
     if len(own) < 2 or any(one["place"] != curve["place"] for one in own):
-        return curve
+        # Its band would be that of the mean.
+        return {key: value for key, value in curve.items() if key not in ("low", "high", "band")}
     table = np.array([one["value"] for one in own], float)
     mean, half = table.mean(axis=0), np.array([half_width(list(column)) for column in table.T])
     return {**curve, **{key: [float(one) if math.isfinite(one) else None for one in row]
@@ -72,22 +73,26 @@ def _curve(curve: Mapping[str, Any], members: Sequence[Measurement]) -> Mapping[
             "band": f"95 % prediction from {len(own)} draws of the posterior"}
 
 
-def marked(records: Iterable[QuantityRecord], case: str, fitted: Mapping[str, Any], parameters: Mapping[str, Any]) -> list[QuantityRecord]:
+def marked(records: Iterable[QuantityRecord], case: str, variant: str, fitted: Mapping[str, Any],
+           parameters: Mapping[str, Any]) -> list[QuantityRecord]:
     """The `records` of a run of `case` with `parameters`, those `calibrated` whose references were `fitted` (the record's facts).
 
-    Fitted is a target whose reference here is within its standard uncertainty of it. Where that holds for all targets, or the run has the
-    conditions of the calibration, it is the fitted experiment: then every quantity of a source of the targets is calibrated, and after a
-    fit to a curve, whose source is not known, all that is compared with an experiment or another code.
+    Fitted is a target whose reference here is within its standard uncertainty of it. Where that holds for all targets that have a
+    reference, or the run is of the variant or has the conditions of the calibration, it is the fitted experiment: then every quantity of
+    a source of the targets is calibrated, and after a fit to a curve, whose source is not known, all that is compared with an experiment
+    or another code.
     """
     records = list(records)
     if case != fitted["case"]:
         return records
     targets = fitted["targets"]
-    near = {one.name: one.reference is not None and abs(one.reference - targets[one.name]["value"]) <= targets[one.name]["uncertainty"]
-            for one in records if "value" in targets.get(one.name, {})}
-    same = all(parameters.get(name) == value for name, value in fitted["conditions"].items() if name not in _CHANCE)
+    near = {one.name: abs(one.reference - targets[one.name]["value"]) <= targets[one.name]["uncertainty"]
+            for one in records if one.reference is not None and "value" in targets.get(one.name, {})}
+    # Step, stiffness or number of frames of a run of the variant make it no other experiment; what else was changed is not evidence either.
+    same = variant == fitted.get("variant") or all(parameters.get(name) == value for name, value in fitted["conditions"].items()
+                                               if name not in _CHANCE)
     again = same or (bool(near) and all(near.values()))
-    curves, sources = any("at" in one for one in targets.values()), {one.source for one in records if one.name in near}
+    curves, sources = any("at" in one for one in targets.values()), {one.source for one in records if one.name in targets}
 
     def why(one: QuantityRecord) -> str:
         if one.reference is None or not (near.get(one.name) or again):

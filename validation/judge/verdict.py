@@ -31,7 +31,7 @@ def quantities(case: Case, found: Measurement, variant: str = "", parameters: Ma
         samples = record.samples if case.paired else ()
         records.append(replace(record, family=_family(case, one, name, variant), cause=cause, samples=samples))
     if fitted:
-        records = prediction.marked(records, case.name, fitted, parameters or {})
+        records = prediction.marked(records, case.name, variant, fitted, parameters or {})
     return tuple(records)
 
 
@@ -75,7 +75,7 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         verdict=verdict, reason=reason, detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence,
         compared=one.compared and value.compared, control=one.control, decides=decided, samples=value.estimate.samples,
         deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
-        chance=chance(half, tolerance, packings(value.estimate.basis)),
+        chance=chance(half, tolerance, len(value.estimate.samples) or packings(value.estimate.basis)),
         agreement=None if one.agreement is None else one.agreement * value.scale)
 
 

@@ -60,7 +60,7 @@ def points(rows: Iterable[Row]) -> list[Point]:
 
 
 def _has_ratio(one: QuantityRecord) -> bool:
-    return (one.evidence in KINDS and one.standing not in ("information", "calibrated") and one.deviation_kind == "relative"
+    return (one.evidence in KINDS and one.standing != "information" and not one.calibrated and one.deviation_kind == "relative"
             and (one.value or 0.0) > 0.0 and (one.reference or 0.0) > 0.0)
 
 

@@ -18,6 +18,7 @@ from dembark.common.extras import advice
 from dembark.common.files import retire, write_atomic
 from dembark.postproc import pictures
 from dembark.validation import analysis, metrics, provenance, results
+from dembark.validation.campaigns import targets
 from dembark.validation.case.folders import files, find
 from dembark.validation.case.model import Study
 from dembark.validation.judge import comparison, inputs
@@ -123,7 +124,8 @@ def _of_report(folder: Path) -> str:
     """Hash of the inputs of a report: results, the states of the planned runs, the files of the cases, and the code that lays it out."""
     plan = {key: value for key, value in results.plan(folder).items() if key not in ("submitted", "runs")}
     states = [(state.folder, state.inputs, state.state, state.message) for state in results.states(folder)]
-    kept = {str(path.relative_to(folder)): inputs.content(path) for path in (folder / CAMPAIGN_FILE, *result_files(folder))}
+    kept = {str(path.relative_to(folder)): inputs.content(path)
+            for path in (folder / CAMPAIGN_FILE, *sorted((folder / targets.FOLDER).glob("*")), *result_files(folder))}
     cases = [path for path in files() if path.parent.name in {name.split("/")[0] for name in kept}]
     drawing = [str(path) for case in cases if (path := case.with_name("figures.py")).is_file()]
     return inputs.digest(plan, states, kept, {path.parent.name: inputs.content(path) for path in cases},

@@ -226,7 +226,8 @@ class _Scene:
         a, b, part = self.build(1.0).worst_overlap()
         if part > MOST_OVERLAP:
             partner = f"wall {-b}" if b < 0 else f"body {b}"
-            raise ValueError(f"body {a} and {partner} overlap at the start by {part:.3g} of the radius; at most {MOST_OVERLAP:g} is allowed")
+            raise ValueError(f"body {a} and {partner} overlap at the start by {part:.3g} of the radius; "
+                             f"at most {MOST_OVERLAP:g} is allowed")
 
     def run(self, duration: float, dt: float, every: int, dimension: int, columns: Sequence[tuple[int, int]]) -> ImpactMotion:
         scene = self.at(dt)

@@ -159,7 +159,7 @@ def _complete(sample: Sample, engine: str, points: Sequence[Point]) -> tuple[lis
 
 def of_curve(name: str, target: CurveTarget, places: Array,
              measured: Sequence[Mapping[str, Any]]) -> tuple[list[Output], Callable[[Array], float]]:
-    """A curve, `measured` at the points of a sample with the quantiles `places`, as few numbers that are fitted in its place; and how far a
+    """A curve, `measured` at the points of a sample with the quantiles `places`, as few numbers, to which the fit is made; and how far a
     curve with such numbers is from the target, root mean square, in its standard uncertainties.
 
     The curves over the standard deviations of the target, its correlation taken out, are written in their principal components, as by

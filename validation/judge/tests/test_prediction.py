@@ -19,7 +19,7 @@ ANGLE = QuantityRecord("angle", 40.0, "pass", tolerance=2.0, reference=40.9, evi
 BEND = replace(ANGLE, name="bend", reference=10.0)
 OTHER = replace(ANGLE, name="angle_elsewhere", source="Another drum")
 SUM = replace(ANGLE, name="sum", evidence="identity", source="Newton", reference=0.0)
-FITTED: dict[str, Any] = {"case": "drum", "targets": {"angle": {"value": 40.9, "uncertainty": 1.0}},
+FITTED: dict[str, Any] = {"case": "drum", "variant": "slow", "targets": {"angle": {"value": 40.9, "uncertainty": 1.0}},
                           "conditions": {"speed": 1.5, "seed": 3}}
 
 
@@ -64,25 +64,25 @@ def test_what_some_members_lack_is_not_judged() -> None:
     assert found.values["apparent_mass_ratio"].reason == "1 of 3 members have no such value"
 
 
-def standing(records: tuple[QuantityRecord, ...], parameters: dict[str, Any], **changes: Any) -> dict[str, str]:
-    return {one.name: one.standing for one in prediction.marked(records, "drum", FITTED | changes, parameters)}
+def standing(records: tuple[QuantityRecord, ...], parameters: dict[str, Any], variant: str = "fast", **changes: Any) -> dict[str, str]:
+    return {one.name: one.standing for one in prediction.marked(records, "drum", variant, FITTED | changes, parameters)}
 
 
 def test_a_fitted_quantity_that_agrees_is_no_pass() -> None:
     """The negative control: without the mark it would be one."""
     assert tally([ANGLE]).passed == 1
-    found = tally(prediction.marked([ANGLE], "drum", FITTED, {"speed": 3.0}))
+    found = tally(prediction.marked([ANGLE], "drum", "fast", FITTED, {"speed": 3.0}))
     assert (found.passed, found.open, found.checks, found.calibrated) == (0, 0, 0, 1)
     assert found.sentence == "no checks; 1 calibrated, not counted"
     # The same fact in another engine neither, nor one that could not be decided; a failure stays one.
     twice = [replace(ANGLE, family="angle"), replace(ANGLE, family="angle", verdict="info")]
-    assert tally(prediction.marked(twice, "drum", FITTED, {})).calibrated == 1
-    assert tally(prediction.marked([replace(ANGLE, verdict="fail")], "drum", FITTED, {})).failed == 1
+    assert tally(prediction.marked(twice, "drum", "fast", FITTED, {})).calibrated == 1
+    assert tally(prediction.marked([replace(ANGLE, verdict="fail")], "drum", "fast", FITTED, {})).failed == 1
 
 
 def test_a_point_of_a_calibration_neither_passes_nor_fails() -> None:
     points = [replace(ANGLE, verdict=one) for one in ("pass", "fail", "info")]
-    found = prediction.marked(points, "drum", FITTED | {"conditions": {}, "sampled": True}, {})
+    found = prediction.marked(points, "drum", "fast", FITTED | {"conditions": {}, "sampled": True}, {})
     assert [one.standing for one in found] == ["calibrated"] * 3 and found[1].reason == prediction.SAMPLED
 
 
@@ -90,7 +90,7 @@ def test_another_reference_is_evidence() -> None:
     """At another speed another angle was measured."""
     records = (replace(ANGLE, reference=37.6), BEND, OTHER, SUM)
     assert set(standing(records, {"speed": 1.0}).values()) == {"passed"}
-    assert prediction.marked([ANGLE], "silo", FITTED, {}) == [ANGLE]
+    assert prediction.marked([ANGLE], "silo", "fast", FITTED, {}) == [ANGLE]
 
 
 def test_what_else_was_seen_in_the_fitted_experiment_is_no_evidence() -> None:
@@ -101,6 +101,11 @@ def test_what_else_was_seen_in_the_fitted_experiment_is_no_evidence() -> None:
     own = {"angle": {"value": 45.0, "uncertainty": 1.0}}
     assert standing(records, {"speed": 1.5, "seed": 9}, targets=own) == expected
     assert set(standing(records, {"speed": 3.0}, targets=own).values()) == {"passed"}
+    # A step or a stiffness changed in the variant of the calibration makes no other experiment.
+    assert standing(records, {"speed": 1.5, "step": 0.1}, "slow", targets=own) == expected
+    # Of two targets one has no reference here.
+    unknown = FITTED["targets"] | {"gone": {"value": 1.0, "uncertainty": 1.0}}
+    assert standing((*records, replace(ANGLE, name="gone", reference=None)), {"speed": 3.0}, targets=unknown)["bend"] == "calibrated"
     # Two targets, of which one is elsewhere as well.
     both = FITTED["targets"] | {"bend": {"value": 20.0, "uncertainty": 1.0}}
     assert standing(records, {"speed": 3.0}, targets=both) == expected | {"bend": "passed"}
