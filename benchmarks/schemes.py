@@ -297,7 +297,8 @@ def bed_limit(restitution: float = 1.0, steps: int = 500) -> dict[str, float]:
         y = solved(problem, SCHEMES["engines"][2], turn / highest)
         return y is None or float(np.abs(y[150:300]).max()) > 1e-6
 
-    low, high = 0.5, 2.5
+    low, high = 0.1, 2.5
+    assert grows(high) and not grows(low)
     while high - low > 0.02:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if grows(middle) else (middle, high)

@@ -31,7 +31,7 @@ def test_as_many_discs_as_logs_start_without_overlap() -> None:
     discs, speed = drum.section(100)
     motion = discs.run(2e-4, drum.STEP)
     assert motion.report["active"].max() == 0
-    assert speed < drum.SPEED * 1.1
+    assert speed <= drum.SPEED * 1.1
 
 
 def test_too_many_logs_are_refused() -> None:

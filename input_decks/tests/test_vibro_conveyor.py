@@ -130,9 +130,9 @@ def test_engines_convey_as_mechanics_says(engine: str, variant: str, simulate: A
 
 
 def test_a_ball_of_stiff_material_rolls_without_creeping(simulate: Any) -> None:
-    """That of the case is too soft: its creep, 0.0018 of the plate's speed, falls as the overlap."""
+    """A softer one creeps: by 0.0018 of the plate's speed at 20 MPa, in proportion to its overlap."""
     found = judged("vibro_conveyor", conveyor.measure([simulate(
-        "vibro_conveyor", "liggghts", {"periods": 8, "run_in": 0, "youngs_modulus": 2e8}, "rolls")]))
+        "vibro_conveyor", "liggghts", {"periods": 8, "run_in": 0}, "rolls")]))
     assert names(found, "pass") == {"energy_balance", "rest_speed"}, found
 
 

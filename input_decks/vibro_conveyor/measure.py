@@ -41,6 +41,12 @@ def expected(p: Numbers) -> float:
     return block_speed(acceleration(p), p["throw_angle"], p["static_friction"], p["restitution"])
 
 
+def coulomb(p: Numbers) -> bool:
+    """Whether the run is dry and has one coefficient of friction, as the block of the theory."""
+    kinetic = p["static_friction"] * p["kinetic_friction_ratio"] if p["kinetic_friction"] is None else p["kinetic_friction"]
+    return bool(not p["bridge_volume"] and math.isclose(kinetic, p["static_friction"]))
+
+
 def plate_speed(p: Numbers) -> float:
     """Largest horizontal speed (m/s) of the plate."""
     return acceleration(p) * p["gravity"] / (2.0 * math.pi * p["motion_frequency"]) / math.tan(p["throw_angle"])
@@ -78,7 +84,7 @@ def measure(replicas: Replicas) -> Measurement:
     speed = exact(means[0]) if single else over_replicas([Estimate(mean, math.inf, "one packing") for mean in means])
     ratio = Estimate(speed.value / scale, speed.half / scale, speed.basis)
     still, theory = single and slips_nowhere(p), expected(p)
-    block = single and p["spin"] == "blocked"
+    block = single and p["spin"] == "blocked" and coulomb(p)
     values = {
         "energy_balance": Value(exact(max(imbalance(run.times(), CONTACT_PARTS) for run in replicas)), exact(0.0)),
         **({"rest_speed": Value(ratio, exact(0.0))} if still else

@@ -204,6 +204,9 @@ class Assembly {
       r.point += r.offset_a;
       r.moment_a = cross(r.offset_a, r.normal);
       r.moment_b = cross(r.offset_b, r.normal);
+    } else {
+      // A row is used again from step to step, perhaps after one with a lever.
+      r.moment_a = r.moment_b = {};
     }
     if (r.law->friction.interface_shear_strength < unlimited_strength)
       r.radius = wall || a.radius == 0.0 ? a.radius : a.radius * other / (a.radius + other);

@@ -142,7 +142,7 @@ class HistoryKeeper {
     if (!base().begun) deform_overlaps(rows);
     if (!orphans_.empty())
       for (Row& r : rows)
-        if (r.b < 0 && r.before == &blank_) inherit(r);
+        if (r.b < 0 && !r.lever && r.before == &blank_) inherit(r);
     keep_energies(rows);
     if (orphans_.empty()) return;
     for (const std::size_t o : orphans_) {

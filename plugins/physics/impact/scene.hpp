@@ -52,14 +52,16 @@ class Scene {
   const std::vector<Quaternion>& orientation() const { return orientation_; }
 
   /// Of the pairs of bodies, or of a body and a wall, that overlap now, that with the largest overlap over the smaller radius; its keys and
-  /// that ratio, 0 where nothing overlaps.
+  /// that ratio, 0 where nothing overlaps. Points, which have no radius, and what is held fast do not count.
   std::pair<Key, double> worst_overlap() {
     std::vector<Contact> contacts;
     if (row) row_contacts(contacts);
     else find(0.0, contacts);
     std::pair<Key, double> worst{};
     for (const Contact& c : contacts) {
-      const double a = bodies_[std::size_t(c.a)].radius, radius = c.b >= 0 ? std::min(a, bodies_[std::size_t(c.b)].radius) : a;
+      const Body &one = bodies_[std::size_t(c.a)], &other = c.b >= 0 ? bodies_[std::size_t(c.b)] : one;
+      const double radius = std::min(one.radius, other.radius);
+      if (radius == 0.0 || (std::isinf(one.mass) && std::isinf(other.mass))) continue;
       if (-c.gap > worst.second * radius) worst = {{c.key_a, shown_id(c.key_b)}, -c.gap / radius};
     }
     return worst;

@@ -38,7 +38,7 @@ namespace dembark {
          "coefficientRollingFriction") \
   NUMBER(pair, rolling_damping_ratio, rollingDampingRatio, "1", 0, false, INFINITY, false, 0, "damping ratio of the rolling spring", \
          "coefficientRollingViscousDamping") \
-  NUMBER(global, surface_tension, surfaceTension, "N/m", 0, false, 10, false, no_default, "surface tension of the liquid", nullptr) \
+  NUMBER(global, surface_tension, surfaceTension, "N/m", 0, false, INFINITY, false, no_default, "surface tension of the liquid", nullptr) \
   NUMBER(pair, contact_angle, contactAngle, "rad", 0, false, 1.5707963267948966, false, no_default, "contact angle", nullptr) \
   NUMBER(global, liquid_viscosity, liquidViscosity, "Pa s", 0, false, INFINITY, false, 0, \
          "viscosity of the liquid; 0 is without viscous forces", nullptr) \

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from dembark import _physics
 
 # The numbers of a contact by name, as all engines check them.
+# Engines take these in other units, too; in SI no liquid has more.
+_MOST = {"surface_tension": 10.0}
 CONTACT_PARAMETERS: dict[str, dict[str, Any]] = {str(row["name"]): row for row in _physics.contact_parameters()}
 
 
@@ -68,6 +70,8 @@ def contact_number(name: str, value: ArrayLike, label: str = "") -> NDArray[np.f
     bad = (array <= row["low"] if row["low_open"] else array < row["low"]) | (array > row["high"])
     if not row["infinite"]:
         bad |= np.isinf(array)
+    if name in _MOST and (array[~bad] > _MOST[name]).any():
+        raise ValueError(f"{label} ({row['unit']}) must be at most {_MOST[name]:g}, not {array.max():g}; is it in m{row['unit']}?")
     if bad.any():
         unit = "" if row["unit"] == "1" else f" ({row['unit']})"
         raise ValueError(f"{label}{unit} must be {row['range']}, not {array[bad].flat[0]:g}")

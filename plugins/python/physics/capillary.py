@@ -61,7 +61,7 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
     radius_i, radius_j : m, > 0; ``inf`` is a wall
     gap : m, surface to surface; zero or negative (overlap) is the force at touching
     volume : m^3 of liquid in the bridge, >= 0
-    surface_tension : N/m, >= 0
+    surface_tension : N/m, >= 0, <= 10
     contact_angle : rad, 0 to pi/2, mean of the two surfaces
     model : 'exact' (stable axisymmetric solution of Young and Laplace for the two radii; for V/R^3 = 1e-6...0.1 and angles up to 60
         degrees within 0.1 % up to 0.9 of the rupture distance), 'willett', 'willett_full' (Willett et al., Langmuir 16 (2000) 9396),
@@ -77,7 +77,7 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
     check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
     return _by_angle(angle, model, _physics.BridgeForce.force, *_radii(radius_i, radius_j), numbers("gap", gap, "m", infinite=True),
-                     numbers("volume", volume, "m^3", low=0.0), numbers("surface_tension", surface_tension, "N/m", low=0.0))
+                     numbers("volume", volume, "m^3", low=0.0), numbers("surface_tension", surface_tension, "N/m", low=0.0, high=10.0))
 
 
 def rupture_distance(volume: ArrayLike, contact_angle: ArrayLike, radius_i: ArrayLike, radius_j: ArrayLike, *,

@@ -71,6 +71,8 @@ class RollingResistance:
     def __post_init__(self) -> None:
         contact_number("rolling_friction", self.friction, "friction")
         contact_number("rolling_damping_ratio", self.damping_ratio, "damping_ratio")
+        if self.model == "constant_torque" and self.damping_ratio:
+            raise ValueError("damping_ratio is for the model 'elastic_plastic'")
         if self.model == "off" and (self.friction or self.damping_ratio):
             raise ValueError("the rolling resistance is off; its model can be 'constant_torque' or 'elastic_plastic'")
         object.__setattr__(self, "_law", _physics.RollingResistance(self.model, float(self.friction), float(self.damping_ratio)))
@@ -205,7 +207,7 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
     state = contact.begin()
     times = time_step * np.arange(1, steps + 1, dtype=np.float64)
     out = Trajectory(times, np.empty((steps, n, 3)), np.empty((steps, n, 3)), np.empty((steps, n, 3)), [])
-    apart = separation()
+    apart, near = separation(), sum(body.radius for body in bodies)
     # The first half step: no contact yet, gravity only, as the engines' set-up finds it.
     v += 0.5 * time_step * g
     for k in range(steps):
@@ -215,7 +217,7 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
         other = (_triple(v[1]), _triple(w[1]), bodies[1].radius, bodies[1].mass) if wall is None else (ZERO, ZERO, np.inf, np.inf)
         step = ContactForce(*state.step(_triple(apart), _triple(v[0]), other[0], _triple(w[0]), other[1], bodies[0].radius, other[2],
                                         bodies[0].mass, other[3], time_step, True))
-        if step.overlap > least or np.dot(apart, before) < 0.0:
+        if step.overlap > least or (step.overlap <= 0.0 and _closest(before, apart) < near - 0.01 * least):
             raise ValueError(f"the bodies pass through each other in step {k + 1}; take a shorter time_step, a larger "
                              "effective_youngs_modulus or a lower speed")
         acceleration = np.tile(g, (n, 1))
@@ -235,6 +237,14 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
         w += 0.5 * time_step * spin_up
     _warn_of_few_steps(np.array([step.overlap > 0.0 for step in out.contacts]), time_step)
     return out
+
+
+def _closest(before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
+    """Least distance between two centres, or of one from a wall, on a straight way from one separation to another."""
+    way = after - before
+    length = float(np.dot(way, way))
+    part = min(1.0, max(0.0, -float(np.dot(before, way)) / length)) if length else 0.0
+    return float(np.linalg.norm(before + part * way))
 
 
 def _warn_of_few_steps(touching: NDArray[np.bool_], time_step: float) -> None:

@@ -436,8 +436,8 @@ class ImpactSystem(_System):
                 bodies["spin"] = vectors("spin", spin, "rad/s", n, 3)
             else:
                 bodies["spin"][:, 2] = _each("spin", spin, "rad/s", n)
-        if d == 2 and not all(_along_z(wall) for wall in walls if isinstance(wall, Drum)):
-            raise ValueError("in the plane the axis of a drum must be along z")
+        if d == 2 and not all(map(_along_z, walls)):
+            raise ValueError("in the plane the axis of a drum must be along z, and a plane must not turn nor have a normal with a z component")
         _load(bodies, force, gravity, d)
         self._scene = _system_scene(bodies, stiffness, damping, friction, tangential_ratio, walls, theta, contact_damping, friction_sweeps,
                                     method, reach)
@@ -515,10 +515,15 @@ class CapsuleSystem(_System):
             own = _physics.capsule_inertia(m[finite], r[finite], bodies["length"][finite])
             bodies["axial_inertia"][finite], bodies["inertia"][finite] = np.asarray(own).T
         else:
-            given = numbers("inertia", inertia, "kg m^2", low=0.0, low_open=True)
+            given = numbers("inertia", inertia, "kg m^2", low=0.0, low_open=True, infinite=True)
             if given.shape not in ((n, 2), (2,)):
                 raise ValueError(f"inertia must have the shape ({n}, 2), not {given.shape} (kg m^2)")
-            bodies["axial_inertia"], bodies["inertia"] = np.broadcast_to(given, (n, 2)).T
+            axial, across = np.broadcast_to(given, (n, 2)).T
+            if (axial > 2.0 * across).any() or (axial != across)[bodies["length"] == 0.0].any():
+                raise ValueError("inertia (kg m^2): that about the axis is at most twice that across it, and the same without a length")
+            if not np.isinf(given).all() and np.isinf(m).any():
+                raise ValueError("inertia (kg m^2): of a body with an infinite mass it must be infinite")
+            bodies["axial_inertia"], bodies["inertia"] = axial, across
         bodies["position"] = x
         bodies["orientation"] = _quaternions(orientation, axis, n)
         for name, value, unit in (("velocity", velocity, "m/s"), ("spin", spin, "rad/s")):

@@ -92,7 +92,7 @@ def test_a_result_holds_the_deck_that_made_it(tmp_path: Path, decks: Path, stand
     folder, _ = run(tmp_path / "out")
     (decks / "box" / "liggghts.in").write_text("# another deck\n")
     assert deck in (folder / "liggghts.in").read_text() and (folder / "case/case.toml").read_text() == case
-    assert re.search(r"variable grain_count +index 10 # number of grains", (folder / "liggghts.in").read_text())
+    assert re.search(r"variable grain_count +string 10 # number of grains", (folder / "liggghts.in").read_text())
     assert (folder / "lid/lid.stl").is_file() and not (folder / "yade.py").exists()
 
 

@@ -128,6 +128,7 @@ def test_bridge_holds_a_grain_and_needs_energy_to_part():
     ({"restitution": np.nan}, "restitution"),
     ({"effective_youngs_modulus": 0.0}, "youngs_modulus .Pa. must be > 0"), ({"normal_law": "stiff"}, "'hertz' or 'hooke'"),
     ({"bridge_volume": -1e-12}, "bridge_volume"), ({"bridge_volume": 1e-12, "surface_tension": -1.0}, "surface_tension"),
+    ({"bridge_volume": 1e-12, "surface_tension": 72.0}, r"surface_tension \(N/m\) must be at most 10, not 72; is it in mN/m\?"),
     ({"bridge_volume": 1e-12, "contact_angle": 2.0}, "contact.angle"), ({"bridge_volume": 1e-12, "capillary_model": "magic"}, "magic"),
     ({"normal_law": "hooke", "characteristic_velocity": 0.0}, "characteristic_velocity"),
     # What no law would use.
@@ -176,6 +177,12 @@ def test_what_passes_through_is_refused():
         drop(CONTACT, replace(ONE, velocity=(0.0, 0.0, -500.0)), time_step=1e-3, steps=5)
     with pytest.raises(ValueError, match="the bodies pass through each other"):
         collide(CONTACT, replace(ONE, velocity=(0.0, 0.0, -500.0)), TWO, time_step=1e-6, steps=50)
+    # Past each other in one step, through a contact that no step sees; far from each other.
+    ball = Body(radius=RADIUS, mass=MASS, position=(-6.5e-3, 0.0, 0.0), velocity=(13.0, 0.0, 0.0))
+    other = Body(radius=RADIUS, mass=MASS, position=(0.0, 8e-3, 0.0))
+    with pytest.raises(ValueError, match="the bodies pass through each other in step 1"):
+        collide(CONTACT, ball, other, time_step=1e-3, steps=1)
+    collide(CONTACT, ball, replace(other, position=(0.0, 20e-3, 0.0)), time_step=1e-3, steps=1)
     with pytest.raises(ValueError, match="bridge_volume must be at most that of the smallest sphere"):
         drop(replace(CONTACT, bridge_volume=80.0, surface_tension=0.072), ONE, time_step=1e-6, steps=5)
 

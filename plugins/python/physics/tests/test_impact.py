@@ -169,6 +169,14 @@ def test_every_method_gives_the_same_forces():
     np.testing.assert_allclose(forces, np.broadcast_to(forces[0], np.shape(forces)), rtol=1e-9, atol=1e-9)
 
 
+def test_what_is_held_or_rests_may_overlap():
+    """A rough floor of fixed discs; a log on the deflection of its weight."""
+    floor = ImpactSystem(np.inf, 0.1, [[0.0, 0.0], [0.15, 0.0]], inertia=[np.inf, np.inf], walls=[Plane(point=(0, 0), normal=(0, 1))])
+    assert not floor.run(1e-3, 1e-4).velocity.any()
+    row = ImpactChain([1], 1e7, [-9.81 / 1e7], [0], left_wall=0.0, force=-9.81)
+    assert abs(row.run(0.01, 1e-5).velocity).max() < 1e-6
+
+
 def test_in_space():
     """A ball that slides and spins on a floor obliquely; the axis of its spin turns as friction says."""
     ball = ImpactSystem(1.0, 0.1, [[0, 0, 0.1 - G / 5e6]], [[1.0, 2.0, 0]], spin=[[0, 0, 0]], stiffness=1e7, gravity=(0, 0, -G),
@@ -198,7 +206,8 @@ def test_in_space():
     (lambda: ImpactSystem(40.0, 0.1, [[0.0, 0.0], [0.1, 0.0]]), "overlap at the start by 1 of the radius; at most 0.01 is allowed"),
     (lambda: ImpactSystem(40.0, 0.1, [[0.0, 0.0], [0.5, 0.0]], walls=[Drum(radius=0.2)]), "and wall 1 overlap at the start"),
     (lambda: ImpactChain([20, 80], 1e7, [0, 0.1], [0, 0], radius=0.1), "overlap at the start by 1 of the radius"),
-    (lambda: ImpactChain([20], 1e7, [1e-3], [0], left_wall=0.5), "body 0 and wall 1 overlap at the start"),
+    (lambda: ImpactChain([20], 1e7, [1e-3], [0], radius=0.1, left_wall=0.0), "body 0 and wall 1 overlap at the start"),
+    (lambda: ImpactSystem(1.0, 0.1, [[0.0, 1.0]], walls=[Plane(point=(0, 0), normal=(0, 1), omega=5.0)]), "a plane must not turn"),
 ])
 def test_one_clear_line(wrong, message):
     with pytest.raises(ValueError, match=message) as error:
