@@ -437,7 +437,8 @@ class ImpactSystem(_System):
             else:
                 bodies["spin"][:, 2] = _each("spin", spin, "rad/s", n)
         if d == 2 and not all(map(_along_z, walls)):
-            raise ValueError("in the plane the axis of a drum must be along z, and a plane must not turn nor have a normal with a z component")
+            raise ValueError("in the plane the axis of a drum must be along z, and a plane must not turn nor have a normal with a z "
+                             "component")
         _load(bodies, force, gravity, d)
         self._scene = _system_scene(bodies, stiffness, damping, friction, tangential_ratio, walls, theta, contact_damping, friction_sweeps,
                                     method, reach)
