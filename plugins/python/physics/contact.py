@@ -217,7 +217,8 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
         other = (_triple(v[1]), _triple(w[1]), bodies[1].radius, bodies[1].mass) if wall is None else (ZERO, ZERO, np.inf, np.inf)
         step = ContactForce(*state.step(_triple(apart), _triple(v[0]), other[0], _triple(w[0]), other[1], bodies[0].radius, other[2],
                                         bodies[0].mass, other[3], time_step, True))
-        if step.overlap > least or (step.overlap <= 0.0 and _closest(before, apart) < near - 0.01 * least):
+        unseen = step.overlap <= 0.0 and np.linalg.norm(before) >= near and _closest(before, apart) < near - 0.01 * least
+        if step.overlap > least or unseen:
             raise ValueError(f"the bodies pass through each other in step {k + 1}; take a shorter time_step, a larger "
                              "effective_youngs_modulus or a lower speed")
         acceleration = np.tile(g, (n, 1))

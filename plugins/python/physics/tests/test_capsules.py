@@ -301,7 +301,7 @@ def test_every_method_gives_the_same_forces(balls):
     # One that goes on has contacts of logs and of balls from the steps before.
     one.run(2e-4, 2e-4)
     forces.append([c["normal_force"] for c in one.contacts()])
-    assert len(forces[0]) > 12  # more than are solved with a matrix in any case
+    assert len(forces[0]) > (8 if balls else 12)  # of logs more than are solved with a matrix in any case
     for other in forces[1:]:
         np.testing.assert_allclose(other, forces[0], rtol=1e-9, atol=1e-6)
 
@@ -350,7 +350,7 @@ GOOD = {"mass": 40.0, "radius": 0.1, "length": 1.0, "position": [[0, 0, 0], [0, 
     ({"orientation": (0, 0, 0, 0)}, "orientation must not be zero"),
     ({"orientation": (1, 0, 0)}, r"orientation must have the shape \(2, 4\), not \(3,\)"),
     ({"orientation": (1, 0, 0, 0), "axis": (0, 0, 1)}, "give orientation or axis, not both"),
-    ({"inertia": (1.0, -1.0)}, r"inertia must be > 0 kg m\^2 and finite, not -1"),
+    ({"inertia": (1.0, -1.0)}, r"inertia must be > 0 kg m\^2, not -1"),
     ({"inertia": 1.0}, r"inertia must have the shape \(2, 2\), not \(\)"),
     ({"walls": [Drum(radius=1.0, axis=(0, 0, 0))]}, "axis must not be zero"),
     ({"period": 5.0, "walls": [Drum(radius=9.0, axis=(0, 0.1, 1))]}, "with a period all walls must be the same along z"),
