@@ -122,9 +122,9 @@ class Tracks:
                        others={name: values[frames] for name, values in self.others.items()})
 
     def lag(self, time: float) -> int:
-        """The frames in a time (s); DembarkError where it is no multiple of the interval, by more than 1 %, or the tracks are shorter."""
+        """The frames in a time (s); DembarkError where it is no multiple of the interval, by more than 5 %, or the tracks are shorter."""
         frames = max(1, round(time / self.interval))
-        if abs(frames * self.interval - time) > 0.01 * time:
+        if abs(frames * self.interval - time) > 0.05 * time:
             raise DembarkError(f"{self.name}: {time:g} s are no multiple of its {self.interval:.4g} s between frames", "",
                                "give an --interval and --diffusion that fit")
         if frames >= len(self.times):
