@@ -47,6 +47,7 @@ struct Capsule : Body {
   Quaternion orientation{};  ///< from the axes of the body, z along its own, to space
 
   void begin() { half_axis = (0.5 * length) * normalised(orientation).turned({0.0, 0.0, 1.0}); }
+  // NOLINTNEXTLINE(bugprone-derived-method-shadowing-base-method): of an archive, which knows the type
   auto fields() { return std::tuple_cat(Body::fields(), std::tie(axial_inertia, length, orientation)); }
 };
 
