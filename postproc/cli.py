@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
@@ -33,7 +33,7 @@ from .cli_output import check_places, progress, provenance, say
 from .contacts import ContactColumnsError
 from .dumps.frames import ColumnsError, DensityError, DumpError, DumpWarning
 from .grains import GrainFrame
-from .sources import frames_at, mean_diameter, open_source, select
+from .sources import Source, frames_at, mean_diameter, open_source, select
 from .style import SEQUENTIAL
 from .walls import Inclusion, Wall
 from .walls.run import WallLoads, wall_lines
@@ -123,8 +123,7 @@ def fields(
     if not any((out, paraview, grains, plot)):
         raise DembarkError("there is nothing to write", "", "name a file with --out or --paraview, or a folder with --plot")
     check_places(out, paraview, grains, plot=plot, read=(source, contacts))
-    opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
-                         contact_columns=contact_columns, units=units)
+    opened = _opened(source, contacts, time_step, density, columns, contact_columns, units)
     chosen = select(opened, frame_numbers(frames, len(opened.grains)))
     averages = FieldAverages(
         chosen, kernel=kernel, width=width, grid=grid, spacing=spacing, box=box, average=average, walls=wall or (), cells=cells,
@@ -172,8 +171,7 @@ def walls(
 ) -> None:
     """Normal and shear stress on walls and inclusions: distribution, time series, fluctuations, peaks."""
     check_places(out, paraview, plot=plot, read=(source, contacts))
-    opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
-                         contact_columns=contact_columns, units=units)
+    opened = _opened(source, contacts, time_step, density, columns, contact_columns, units)
     chosen = select(opened, frame_numbers(frames, len(opened.grains)))
     loads, diameters, written = WallLoads(wall or (), chosen), [], []
     if not loads.walls:
@@ -313,8 +311,7 @@ def render(
     drawing.View.named(view or "iso")
     look = Look(colour_by, unit, value_range(span) if span else None, colours=colours, view=view, cut=cut, surface=surface, walls=not bare,
                 size=picture_size(size) if size else None)
-    opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
-                         contact_columns=contact_columns, units=units)
+    opened = _opened(source, contacts, time_step, density, columns, contact_columns, units)
     numbers = frames_at(opened, at) if at else frame_numbers(frames or (":" if film else "-1"), len(opened.grains))
     chosen = select(opened, numbers)
     album = Album(chosen.source, numbers, look, [_drawn(parse_wall(text, chosen.diameter).wall) for text in wall or ()])
@@ -329,6 +326,13 @@ def render(
                 written.append(write_atomic(file, drawing.still(image, file.suffix)))
                 advance()
     say([*chosen.lines([]), *(f"note: {one}" for one in album.notes), *(f"written: {path}" for path in written)])
+
+
+def _opened(source: Path, contacts: Path | None, time_step: float | None, density: float | None, columns: str | None,
+            contact_columns: Mapping[str, Sequence[int | str]] | None, units: str) -> Source:
+    """What the options that describe dumps say of `source`."""
+    return open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
+                       contact_columns=contact_columns, units=units)
 
 
 def _drawn(wall: Wall | Inclusion) -> Wall:
@@ -374,8 +378,7 @@ def tracks(
         found, notes = tracking.read_csv(source).of(ids), []
         found = found.at(frame_numbers(frames, len(found.times)))
     else:
-        opened = open_source(source, contacts, time_step=time_step, density=density, columns=columns.split() if columns else None,
-                             contact_columns=contact_columns, units=units)
+        opened = _opened(source, contacts, time_step, density, columns, contact_columns, units)
         chosen = select(opened, frame_numbers(frames, len(opened.grains)))
         with progress("tracks", len(chosen.numbers)) as advance:
             found = tracking.follow(chosen, ids, advance)

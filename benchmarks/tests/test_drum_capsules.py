@@ -32,6 +32,8 @@ def test_as_many_discs_as_logs_start_without_overlap() -> None:
     motion = discs.run(2e-4, drum.STEP)
     assert motion.report["active"].max() == 0
     assert speed <= drum.SPEED * 1.1
+    radius = math.sqrt(float((drum.logs(100)[0] ** 2).sum()) / drum.FILLING)
+    assert speed**2 * radius == pytest.approx(drum.SPEED**2 * drum.RADIUS)
 
 
 def test_too_many_logs_are_refused() -> None:

@@ -38,6 +38,5 @@ def setup(p: Parameters) -> Setup:
     else:
         grains = packing.grains(p, sites, box)
     plate = strip((0.0, 0.0, 0.0), (p.cell_width, 0.0, 0.0), p.cell_depth)
-    more = {"begin": still * numbers["period_steps"]}
-    return Setup(numbers["steps"], step, grains, {**numbers, **more, **contacts(p, skin=0.2)}, {"plate": plate},
+    return Setup(numbers["steps"], step, grains, {**numbers, **contacts(p, skin=0.2)}, {"plate": plate},
                  {"motion_words": plate_motion(p, still / frequency).words})

@@ -106,8 +106,8 @@ class SampleReader(TableReader):
             found = targets.table(targets.find(given["file"], self.path, case.folder), given.get("where", {}))
             if "at" in given:
                 return self.curve(place, name, given, found)
-            value, own = targets.one_number(found, given["value"], unit), given["uncertainty"]
-            deviation = targets.one_number(found, own, unit) if isinstance(own, str) else finite(float(own), f"uncertainty of {name}")
+            value, own = targets.one_number(found, given["value"], unit), self.deviation(place, name, given, unit)
+            deviation = targets.one_number(found, own, unit) if isinstance(own, str) else own
             return self.positive(place, name, Target(value, deviation, found.path))
         except DembarkError as error:
             raise error if f"[{place}]" in str(error) else self.fail(place, str(error)) from None
@@ -120,11 +120,16 @@ class SampleReader(TableReader):
 
     def curve(self, place: str, name: str, given: Mapping[str, Any], found: Table) -> CurveTarget:
         """The target `name` that is a curve."""
-        own, correlation = given["uncertainty"], self.quantity(place, given["correlation"], "1", f"correlation of {name}")
+        own = self.deviation(place, name, given, "1")
+        correlation = self.quantity(place, given["correlation"], "1", f"correlation of {name}")
         if correlation < 0.0:
             raise self.fail(place, f"correlation of {name} = {correlation:g} is out of range", "it must be >= 0")
-        deviation = own if isinstance(own, str) else finite(float(own), f"uncertainty of {name}")
-        return targets.curve(found, given["at"], given["value"], deviation, correlation)
+        return targets.curve(found, given["at"], given["value"], own, correlation)
+
+    def deviation(self, place: str, name: str, given: Mapping[str, Any], unit: str) -> str | float:
+        """The uncertainty of a target with a table: the name of its column, or a number."""
+        own = given["uncertainty"]
+        return own if isinstance(own, str) else self.quantity(place, own, unit, f"uncertainty of {name}")
 
     def quantity(self, table: str, given: Any, unit: str, name: str) -> float:
         """A finite number in `unit`; `name` is what it was given for."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -142,8 +143,9 @@ def curve(found: Table, at: str, value: str, uncertainty: str | float, correlati
 
 
 def changed(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    """What differs between the targets of a plan and those of now, both as `facts` have them, a phrase for each; a plan of version 1.0.0
-    has pairs of numbers."""
+    """What differs between the targets of a plan, read from its file, and those of now, as `facts` have them, a phrase for each; a plan of
+    version 1.0.0 has pairs of numbers."""
+    now = json.loads(json.dumps(now))  # as in the file
     pair = ("value", "uncertainty")
     before = {name: dict(zip(pair, one, strict=True)) if isinstance(one, list) else one for name, one in before.items()}
     for name in [*before, *(name for name in now if name not in before)]:
@@ -153,6 +155,14 @@ def changed(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
             yield f"{name} is new"
         elif before[name] != now[name]:
             yield f"{name} was {_short(before[name])}, now {_short(now[name])}"
+
+
+def refuse_changed(folder: Path, number: int, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+    """DembarkError when the sweep `number` of the calibration in `folder` has other targets `now` than the plan had `before`: a fit to them
+    would look like a continued one."""
+    if words := list(changed(before, now)):
+        raise DembarkError(f"the calibration in {folder} began with other targets", f"sweeps {number}: {', '.join(words)}",
+                           "restore them, or choose another folder with --out")
 
 
 def _short(fact: Mapping[str, Any]) -> str:

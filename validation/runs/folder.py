@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import getpass
-import json
 import os
 import socket
 from collections.abc import Mapping, Sequence
@@ -123,15 +122,12 @@ def enter(folder: Path, file: Path, plan: Plan, chosen: Options, estimates: Mapp
 
 
 def refuse_changed_targets(folder: Path, plan: Plan) -> None:
-    """DembarkError when `plan` has other targets than the one in `folder`: a fit to them would look like a continued one."""
+    """DembarkError when `plan` has other targets than the one in `folder`."""
     both = zip(results.plan(folder).get("sweeps", ()), plan.facts.get("sweeps", ()), strict=False)
     for number, (before, now) in enumerate(both, start=1):
         known = before.get("sample", {}).get("targets")
-        # As plan.json has them.
-        wanted = json.loads(json.dumps(now.get("sample", {}).get("targets", {})))
-        if known and (words := list(targets.changed(known, wanted))):
-            raise DembarkError(f"the calibration in {folder} began with other targets", f"sweeps {number}: {', '.join(words)}",
-                               "restore them, or choose another folder with --out")
+        if known:
+            targets.refuse_changed(folder, number, known, now.get("sample", {}).get("targets", {}))
 
 
 def _absolute(value: str) -> str:

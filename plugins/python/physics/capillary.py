@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import numbers
+from dembark.physics._checks import contact_number, numbers
 
 CAPILLARY_MODELS: tuple[str, ...] = tuple(_physics.capillary_models())
 
@@ -77,7 +77,7 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
     check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
     return _by_angle(angle, model, _physics.BridgeForce.force, *_radii(radius_i, radius_j), numbers("gap", gap, "m", infinite=True),
-                     numbers("volume", volume, "m^3", low=0.0), numbers("surface_tension", surface_tension, "N/m", low=0.0, high=10.0))
+                     numbers("volume", volume, "m^3", low=0.0), contact_number("surface_tension", surface_tension))
 
 
 def rupture_distance(volume: ArrayLike, contact_angle: ArrayLike, radius_i: ArrayLike, radius_j: ArrayLike, *,

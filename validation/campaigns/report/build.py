@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from dembark.common.errors import DembarkError, RunError
+from dembark.common.errors import RunError
 from dembark.common.files import write_atomic
 from dembark.validation.campaigns import targets
 from dembark.validation.campaigns.spec import SweepSpec, read
@@ -45,11 +44,9 @@ def _chapters(gathered: ReportData, drawn: Path) -> dict[str, Any]:
     file = gathered.folder / "campaign.toml"
     # Conditions between parameters, which a fit keeps, are in the file only.
     specs = read(file).sweeps if file.is_file() and any(one.sample.get("targets") for one in found) else (None,) * len(found)
-    for one, spec in zip(found, specs, strict=True):
-        # As plan.json has them.
-        now = json.loads(json.dumps(spec.sample.facts().get("targets", {}))) if spec and spec.sample else {}
-        if now and (words := list(targets.changed(one.sample.get("targets", {}), now))):
-            raise DembarkError("the targets are not those of the plan", f"in {gathered.folder}: {', '.join(words)}", "restore them")
+    for number, (one, spec) in enumerate(zip(found, specs, strict=True), start=1):
+        if spec and spec.sample and (known := one.sample.get("targets")):
+            targets.refuse_changed(gathered.folder, number, known, spec.sample.facts().get("targets", {}))
     return {"title": f"Campaign {gathered.summary.get('campaign') or gathered.folder.name}",
             "sweeps": [_sweep(one, spec, gathered, drawn) for one, spec in zip(found, specs, strict=True)],
             "errors": numerical_errors(found)}

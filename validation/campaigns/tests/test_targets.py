@@ -73,6 +73,7 @@ def test_a_reference_of_the_case_needs_no_copy(decks: Path) -> None:
     (ROW.replace(', uncertainty = "error"', "").replace(', value = "angle"', ""), "the target repose has no value and no uncertainty"),
     (CURVE.replace(", correlation = 0.1", ""), "the target surface has no correlation"),
     (CURVE.replace("0.1 }", "-1 }"), "correlation of surface = -1 is out of range"),
+    (CURVE.replace("0.1 }", "inf }"), "correlation of surface"), (ROW.replace('"error"', "inf"), "uncertainty of repose"),
     (ROW.replace("own.csv", "owm.csv"), "there is no file owm.csv"),
     (ROW.replace('"angle"', '"angel"'), "has no column 'angel'"),
     (ROW.replace('"angle"', "30"), "value = 30 is not the name of a column"),
@@ -113,6 +114,13 @@ def test_a_calibration_goes_on_with_the_targets_that_it_began_with(command: Call
     kept = plan["sweeps"][0]["sample"]["targets"]
     assert kept == {"repose": {"value": 30.0, "uncertainty": 0.5},
                     "surface": {"at": [0.1, 0.2], "values": [0.2, 0.3], "uncertainties": [0.8, 0.7], "correlation": 0.1}}
+    # A copy that was changed does not pass for what was begun.
+    copy = Path("o/targets/own.csv")
+    text = copy.read_text(encoding="utf-8")
+    copy.write_text(text.replace("1,30,", "1,31,"), encoding="utf-8")
+    code, _, error = command("resume", "o")
+    assert code != 0 and "o began with other targets" in error and "repose was 30 ± 0.5, now 31 ± 0.5" in error
+    copy.write_text(text, encoding="utf-8")
     # What changes outside of the folder does not change what was begun.
     Path("own.csv").write_text(TABLE.replace("1,30,", "1,31,"), encoding="utf-8")
     assert command("resume", "o")[0] == 0

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 from scipy.stats import qmc
 
+from dembark.common.errors import DembarkError
 from dembark.postproc.statistics import replica_mean
 from dembark.validation.campaigns.expand import _sweeps, points
 from dembark.validation.campaigns.report import calibration
@@ -211,6 +212,12 @@ def test_the_report_has_the_fit_and_its_files(tmp_path: Path) -> None:
     (point,) = points(read(place / "fitted.toml"))
     assert point.values == fitted["sweeps"][0]["list"][0] and 0.45 < point.values["wall_friction"] < 0.55
     assert point.resolved["grain_diameter"] == spec.sweeps[0].fixed["grain_diameter"] and point.resolved["replicas"] == 5
+    # Other targets than those of the plan are not reported as its own.
+    kept = facts["sweeps"][0]["sample"]["targets"]
+    kept[next(iter(kept))]["value"] += 1.0
+    (tmp_path / "plan.json").write_text(json.dumps(facts))
+    with pytest.raises(DembarkError, match=r"began with other targets, sweeps 1: .* was .*, now"):
+        build(tmp_path)
 
 
 U, PACKINGS, NOISE = 0.03, 5, 0.05
