@@ -85,7 +85,7 @@ def study(name: str, points: Points, along: str) -> Measurement:
                            [gaps.convergence("power_gap", "Gap between both powers", "time step over the Rayleigh time", 2.0)])
     if name == "stiffness":
         return Measurement({}, stiffness(points, place))
-    if name == "rise_count":
+    if along == "grain_count":
         rise = PowerLawFit.of(points, "rise", place)
         return Measurement({"rise_exponent_count": Value(divided(rise.exponent, -1.0), exact(FALL))},
                            [rise.curve("rise", "Rise of the centre of mass", "N", "Δz / d", -FALL, f"∝ N^−{FALL:g}")])

@@ -212,6 +212,20 @@ def test_spheres_in_a_plane_stay_in_it_and_rest_after_the_stop(engine: str, simu
     assert rows["kinetic_energy"][-1] < 0.01 * rows["kinetic_energy"][rows["step"] <= run.derived["held"]].max()
 
 
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_side_walls_hold_the_grains_and_do_work_that_the_account_has(engine: str, simulate: Any) -> None:
+    run = simulate("drive_power", engine, SMALL | {"sides": "walls"})
+    found = judged("drive_power", drive.measure([run]))
+    assert {"energy_balance", "power_gap"} <= names(found, "pass"), found
+    width = run.parameters["cell_width"]
+    for frame in run.grains():
+        assert (frame.positions[:, :2] > 0.96 * frame.radii[:, None]).all()
+        assert (frame.positions[:, :2] < width - 0.96 * frame.radii[:, None]).all()
+    # No grain of the periodic cell keeps away from its faces.
+    free = simulate("drive_power", engine, SMALL)
+    assert any((frame.positions[:, 0] < 0.6 * frame.radii).any() for frame in free.grains())
+
+
 @pytest.mark.parametrize("profile", ["quick", "standard"])
 @pytest.mark.parametrize("variant", sorted(find("drive_power").variants))
 def test_every_variant_can_be_set_up_in_every_profile(variant: str, profile: str) -> None:
