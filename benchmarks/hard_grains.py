@@ -1,17 +1,23 @@
-"""Hard grains: events a second of elastic spheres, and the rise of a gas on a shaken plate that `drive_power` has in soft engines.
+"""Hard grains: events a second of elastic spheres, and a gas on a shaken plate that `drive_power` has in soft engines.
 
 `python -m benchmarks.hard_grains speed` prints events per second of processor time with 1000, 4000 and 10 000 spheres.
 `python -m benchmarks.hard_grains plate --gamma 16` prints the rise of the centre of mass (in d) with its 95 % interval, with the sizes,
-masses and motion of the case's variant `gas_16`, over a bed at rest whose centre is REST high. docs/theory/hard_grains.md has the results.
+masses and motion of the case's variant `gas_16`, over a bed at rest whose centre is REST high.
+`python -m benchmarks.hard_grains map` compares height and power with those of the campaign `drive_power-standard`.
+docs/theory/hard_grains.md has the results.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from dembark.physics import HardGrains, HardMotion, HardWall
@@ -38,27 +44,56 @@ def events_per_second(cells: int, fraction: float = 0.2, events: float = 1e6) ->
     return (passed(after) - passed(before)) / spent
 
 
-def rise(gamma: float, seed: int, friction: float, beta: float, contact_duration: float, periods: int = 30) -> float:
-    """Mean rise (d) of 60 grains in the last `periods` of 25 more, of which the first ten are the ramp."""
+def shaken(gamma: float, seed: int, *, count: int = 60, restitution: float = 0.9, friction: float = 0.27, beta: float = 0.0,
+           contact_duration: float = 1e-5, periods: int = 30) -> tuple[float, float]:
+    """Mean height (d) of the centre of mass over the middle of the plate, and power of the plate over M g V, of `count` grains in the last
+    `periods` of 25 more, of which the first ten are the ramp."""
     random = np.random.default_rng(seed)
-    diameter = random.uniform(0.9, 1.1, 60) * DIAMETER
-    place = np.array([[i, j, k] for k in range(8) for i in range(3) for j in range(3)][:60]) + 0.5
+    diameter = random.uniform(0.9, 1.1, count) * DIAMETER
+    place = np.array([[i, j, k] for k in range(-(-count // 9)) for i in range(3) for j in range(3)][:count]) + 0.5
     place = place * [SIDE / 3, SIDE / 3, 6.2e-3] + random.uniform(-2e-4, 2e-4, place.shape)
     mass = DENSITY * np.pi / 6 * diameter**3
     amplitude = gamma * GRAVITY / (2 * np.pi * FREQUENCY)**2
     plate = HardWall(point=(0, 0, 0), normal=(0, 0, 1), motion=f"harmonic amplitude 0 0 {amplitude!r} frequency {FREQUENCY} ramp 10")
-    gas = HardGrains(mass, diameter / 2, place, random.normal(size=place.shape) * 0.05, restitution=0.9, friction=friction,
+    gas = HardGrains(mass, diameter / 2, place, random.normal(size=place.shape) * 0.05, restitution=restitution, friction=friction,
                      tangential_restitution=beta, gravity=(0, 0, -GRAVITY), periods=[(0, SIDE), (0, SIDE), None], walls=[plate],
                      contact_duration=contact_duration)
     gas.run(25 / FREQUENCY)
     motion = gas.run(periods / FREQUENCY, samples=8 * periods)
-    return float(np.average(motion.position[1:, :, 2], weights=mass, axis=1).mean() / DIAMETER - REST)
+    height = float(np.average(motion.position[1:, :, 2], weights=mass, axis=1).mean() / DIAMETER)
+    speed = amplitude * 2 * np.pi * FREQUENCY
+    return height, float(np.diff(motion.wall_work[[0, -1], 0])[0] / (mass.sum() * GRAVITY * speed * periods / FREQUENCY))
+
+
+def compared(folder: Path, packings: int, law: Mapping[str, Any]) -> Iterator[str]:
+    """Rows of a table: the points of the campaign `drive_power-standard` in `folder`, in a soft engine, and the same gas of hard grains."""
+    for path in sorted(folder.glob("drive_power/*/*/metrics.json")):
+        found = json.loads(path.read_text())
+        p, soft = found["parameters"], {one["name"]: one for one in found["quantities"]}
+        hard = np.array([shaken(p["motion_gamma"], seed, count=p["grain_count"], restitution=p["restitution"], **law)
+                         for seed in range(packings)])
+        ratios = [f"{soft[name]['value'] / values.mean():.3f} ± {half_width(soft[name], values):.3f}"
+                  for name, values in zip(("height", "force_power"), hard.T, strict=True)]
+        yield f"{p['grain_count']:3d} {p['restitution']} {p['motion_gamma']:4.0f} {p['youngs_modulus']:.1e} {' '.join(ratios)}"
+
+
+def half_width(soft: Mapping[str, Any], hard: NDArray[np.float64]) -> float:
+    """Of the 95 % interval of the ratio of a soft engine's quantity to the mean of `hard`."""
+    low, high = soft["interval"]
+    parts = 0.5 * (high - low) / soft["value"], half(hard) / hard.mean()
+    return float(abs(soft["value"] / hard.mean()) * np.hypot(*parts))
+
+
+def half(values: NDArray[np.float64]) -> float:
+    """Half-width of the 95 % interval of the mean."""
+    return float(stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / len(values)**0.5)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=["speed", "plate"])
+    parser.add_argument("what", choices=["speed", "plate", "map"])
+    parser.add_argument("--campaign", type=Path, default=Path("results/campaigns/drive_power-standard"), help="results of the soft engine")
     parser.add_argument("--gamma", type=float, default=16.0, help="peak acceleration of the plate over gravity")
     parser.add_argument("--friction", type=float, default=0.27)
     parser.add_argument("--beta", type=float, default=0.0, help="tangential restitution")
@@ -70,9 +105,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for cells in (10, 16, 22):
             print(f"{cells**3} spheres: {events_per_second(cells, events=given.events):.3g} events a second")
         return 0
-    values = [rise(given.gamma, seed, given.friction, given.beta, given.contact_duration) for seed in range(given.packings)]
-    half = stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / len(values)**0.5
-    print(f"rise {np.mean(values):.3f} ± {half:.3f} d, {len(values)} packings")
+    law: dict[str, Any] = {"friction": given.friction, "beta": given.beta, "contact_duration": given.contact_duration}
+    if given.what == "map":
+        print("grains, restitution, peak acceleration over g, Young's modulus (Pa); soft over hard: height, power")
+        for row in compared(given.campaign, given.packings, law):
+            print(row, flush=True)
+        return 0
+    values = np.array([shaken(given.gamma, seed, **law)[0] for seed in range(given.packings)]) - REST
+    print(f"rise {values.mean():.3f} ± {half(values):.3f} d, {len(values)} packings")
     return 0
 
 

@@ -1,5 +1,7 @@
 """The benchmark of hard grains counts events, and its gas rises as that of `drive_power` does in LIGGGHTS."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -15,12 +17,28 @@ def test_speed_is_printed_for_three_sizes(capsys):
 
 def test_a_gas_rises_as_in_a_soft_engine():
     """LIGGGHTS: 3.62 d, with an interval of 0.06 d; single packings of hard grains scatter by 0.09 d."""
-    values = [hard_grains.rise(16.0, seed, 0.27, 0.0, 1e-5) for seed in range(6)]
+    values = [hard_grains.shaken(16.0, seed)[0] - hard_grains.REST for seed in range(6)]
     assert np.mean(values) == pytest.approx(3.62, abs=0.15)
     # Negative control: nearly smooth grains.
-    assert hard_grains.rise(16.0, 0, 0.27, -0.6, 1e-5) > 4.0
+    assert hard_grains.shaken(16.0, 0, beta=-0.6)[0] - hard_grains.REST > 4.0
 
 
 def test_the_interval_is_printed(capsys):
     assert hard_grains.main(["plate", "--packings", "2", "--gamma", "12"]) == 0
     assert capsys.readouterr().out.startswith("rise ")
+
+
+def test_the_map_compares_with_the_results_of_a_campaign(tmp_path, capsys):
+    """Results of a soft engine that is 1.1 times as high and 0.9 times as strong as hard grains."""
+    height, power = np.mean([hard_grains.shaken(16.0, seed, count=16) for seed in range(4)], axis=0)
+    quantities = [{"name": name, "value": value, "interval": [0.99 * value, 1.01 * value]}
+                  for name, value in (("height", 1.1 * height), ("force_power", 0.9 * power))]
+    parameters = {"motion_gamma": 16.0, "grain_count": 16, "restitution": 0.9, "youngs_modulus": 4e7}
+    folder = tmp_path / "drive_power" / "gas" / "lammps"
+    folder.mkdir(parents=True)
+    (folder / "metrics.json").write_text(json.dumps({"parameters": parameters, "quantities": quantities}))
+    assert hard_grains.main(["map", "--campaign", str(tmp_path), "--packings", "4"]) == 0
+    words = capsys.readouterr().out.splitlines()[1].split()
+    assert words[:3] == ["16", "0.9", "16"]
+    assert float(words[4]) == pytest.approx(1.1, abs=1e-3) and float(words[7]) == pytest.approx(0.9, abs=1e-3)
+    assert 0.01 <= float(words[6]) < 0.5

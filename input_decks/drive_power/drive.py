@@ -101,6 +101,10 @@ class Drive:
         """Its mean in the measuring window (m)."""
         return block_mean(self._means(self.heights())[self.steady :])
 
+    def height(self) -> Estimate:
+        """Mean height of the centre of mass over the middle of the plate in the measuring window (m)."""
+        return block_mean(self._means(self.rows["weight_height"])[self.steady :] / self.weight)
+
     def kinetic(self) -> Estimate:
         """Mean kinetic energy in the measuring window (J)."""
         return block_mean(self._means(self.rows["kinetic_energy"])[self.steady :])

@@ -51,6 +51,7 @@ def measure(replicas: Replicas) -> Measurement:
         "force_power": Value(over(lambda one: one.power("plate_work"))),
         "flight": Value(over(Drive.flight), exact(block.flight) if block else None),
         "rise": Value(over(Drive.rise, diameter)),
+        "height": Value(over(Drive.height, diameter)),
         "kinetic_energy": Value(over(Drive.kinetic, runs[0].weight * diameter)),
         "power_time": once(Drive.power_time),
         "rise_time": once(Drive.rise_time),
