@@ -10,6 +10,7 @@ from yade.dembark.friction import set_friction
 from yade.dembark.logs import LogWriter, drum, log, log_loop, log_wall, logs
 from yade.dembark.machines import TouchWriter, machine_history
 from yade.dembark.moving import mesh, motion, motion_columns, motion_values
+from yade.dembark.plates import LoadedPlates
 from yade.dembark.report import fail, finish
 from yade.dembark.scene import (
     Recorder,
@@ -34,9 +35,9 @@ from yade.dembark.states import options, run, table
 from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energies
 
 __all__ = [
-    "Balance", "CubesRecorder", "DumpWriter", "EnergyWriter", "FluidRecorder", "FluidWriter", "FrameWriter", "HistoryWriter", "LogWriter",
-    "Recorder", "StepMeans", "TouchWriter", "begin", "block", "box", "contact_loop", "drum", "energies", "engine_loop", "fail", "finish",
-    "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs", "machine_history", "materials",
-    "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "of_sorts", "options", "packing", "pairs", "parameters", "periodic",
-    "plane", "planes", "run", "set_friction", "slab_loop", "sort_materials", "table", "tank_walls",
+    "Balance", "CubesRecorder", "DumpWriter", "EnergyWriter", "FluidRecorder", "FluidWriter", "FrameWriter", "HistoryWriter",
+    "LoadedPlates", "LogWriter", "Recorder", "StepMeans", "TouchWriter", "begin", "block", "box", "contact_loop", "drum", "energies",
+    "engine_loop", "fail", "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs",
+    "machine_history", "materials", "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "of_sorts", "options", "packing",
+    "pairs", "parameters", "periodic", "plane", "planes", "run", "set_friction", "slab_loop", "sort_materials", "table", "tank_walls",
 ]
