@@ -28,14 +28,14 @@ def fractions(replica: Replica) -> Array:
     return np.array(found)
 
 
-def weight_error(replica: Replica) -> float:
-    """Force on the plate over the weight − 1, of the bed at rest that is farthest from 0."""
-    rows, numbers = replica.times(), replica.derived
-    weight = replica.grains()[0].masses.sum() * replica.parameters["gravity"]
-    rests = numbers["first"] + numbers["stride"] * np.arange(replica.parameters["taps"] + 1)
-    last = np.searchsorted(rows["step"], rests, side="right") - 1
-    errors = rows["plate_fz"][last] / weight - 1.0
-    return float(errors[np.argmax(np.abs(errors))])
+def impulse_error(replica: Replica) -> float:
+    """From frame to frame: impulse of the plate less that of the weight and what the grains gain, over that of the weight; the largest."""
+    rows, frames = replica.times(), list(replica.grains())
+    steps = np.array([frame.step for frame in frames])
+    gained = np.diff([frame.masses @ frame.velocities[:, 2] for frame in frames])
+    pushed = np.diff(rows["plate_jz"][np.searchsorted(rows["step"], steps)])
+    weight = frames[0].masses.sum() * replica.parameters["gravity"] * np.diff(steps) * replica.time_step
+    return float(np.abs(pushed / weight - 1.0 - gained / weight).max())
 
 
 def measure(replicas: Replicas) -> Measurement:
@@ -48,14 +48,16 @@ def measure(replicas: Replicas) -> Measurement:
         return Value(Estimate(density * fraction.value, density * fraction.half, fraction.basis))
 
     known, wet = FRACTIONS.get(replicas[0].derived["grain_static"]), p["bridge_volume"] > 0.0
+    rubbing = replicas[0].derived["grain_static"] > 0.0
     values = {
         "poured_fraction": Value(loose, None if known is None else exact(known), inapplicable="liquid bridges" if wet else ""),
-        "fraction_in_limits": Value(loose, exact(0.5 * (LOOSEST + CLOSEST)), inapplicable="liquid bridges" if wet else ""),
+        "fraction_in_limits": Value(loose, exact(0.5 * (LOOSEST + CLOSEST)),
+                                    inapplicable="liquid bridges" if wet else "" if rubbing else "grains without friction"),
         "tapped_fraction": Value(tapped),
         "poured_density": bulk(loose),
         "tapped_density": bulk(tapped),
         "hausner_ratio": Value(over_chaotic(each[-1] / each[0] for each in found) if len(found) > 1 else ratio(tapped, loose)),
-        "weight_error": Value(exact(max(map(weight_error, replicas), key=abs)), exact(0.0)),
+        "impulse_error": Value(exact(max(map(impulse_error, replicas))), exact(0.0)),
     }
     return Measurement(values, [profile("taps", "Solid fraction against taps", "taps", "solid fraction",
                                         np.arange(len(found[0]), dtype=float), found)])

@@ -13,7 +13,8 @@ def setup(p: Parameters) -> Setup:
     """The grains fall and rest; then a tap follows the other. Frames are of the beds at rest, before each tap and after the last one."""
     step, d_max = time_step(p), packing.largest(p)
     stride = ROWS * math.ceil((4.0 * p.pulse_time + p.rest_time) / step / ROWS)
-    first = math.ceil(p.settle_time / step)
+    every = stride // ROWS
+    first = every * math.ceil(p.settle_time / step / every)
     taps = [word for number in range(p.taps) for word in tap(p, (first + number * stride) * step)]
     sites, height = packing.slab(p, p.cell_length, p.cell_width, margin=0.0, foot=0.15 * d_max)
     # Four pulses: up, to rest, down, to rest; a plate that has speeded up flings grains up.
@@ -21,7 +22,7 @@ def setup(p: Parameters) -> Setup:
     reach = 2.0 * speed * p.pulse_time
     top = height + reach + 0.5 * (2.0 * speed) ** 2 / p.gravity + 2.0 * d_max
     grains = packing.grains(p, sites, [(0.0, p.cell_length), (0.0, p.cell_width), (-reach - 2.0 * d_max, top)])
-    numbers = {"first": first, "stride": stride, "every": stride // ROWS, "steps": first + p.taps * stride,
+    numbers = {"first": first, "stride": stride, "every": every, "steps": first + p.taps * stride,
                "area": p.cell_length * p.cell_width}
     plate = strip((0.0, 0.0, 0.0), (p.cell_length, 0.0, 0.0), p.cell_width)
     return Setup(numbers["steps"], step, grains, {**numbers, **contacts(p, skin=0.3)}, {"plate": plate}, {"motion_words": tuple(taps)})

@@ -53,8 +53,9 @@ def layer(p: Parameters, speed: float) -> Layer:
 
 
 def plate(p: Parameters, height: float, use: int) -> Array:
-    """Places (n, 3) in m of the glued grains of a plate at `height` (m): about 1.1 d apart, up to d/10 above and below it."""
-    rows = [int(length / (1.1 * p.grain_diameter)) for length in (p.cell_length, p.cell_width)]
+    """Places (n, 3) in m of the glued grains of a plate at `height` (m): at most 1.1 d apart, so that no grain is pressed through, and up
+    to d/10 above and below it."""
+    rows = [math.ceil(length / (1.1 * p.grain_diameter)) for length in (p.cell_length, p.cell_width)]
     places = packing.lattice((rows[0], rows[1], 1), (p.cell_length / rows[0], p.cell_width / rows[1], 1.0), (0.0, 0.0, height - 0.5))
     places[:, 2] += 0.2 * p.grain_diameter * (packing.uniform(np.arange(1, len(places) + 1), p.seed, use) - 0.5)
     return places

@@ -40,7 +40,7 @@ FRACTIONS = {0.0: 0.639, 0.3: 0.593}
 class Loading:
     """Frames of a test (frames,): the load in Pa, the normal stresses of the contacts inside along z and across in Pa, solid fraction,
     contacts of a grain, and the compression ln(h0/h) of the layer since the load began to rise; `peak`: number of the last frame of
-    loading; forces on both plates over the load (rows,)."""
+    loading, `fall`: of the last one before the load falls; forces on both plates over the load (rows,)."""
 
     load: Array
     along: Array
@@ -49,6 +49,7 @@ class Loading:
     coordination: Array
     strain: Array
     peak: int
+    fall: int
     lower: Array
     upper: Array
 
@@ -63,7 +64,7 @@ def read(replica: Replica) -> Loading:
 
     def load(at: Array) -> Array:
         """Pa, as the deck has it."""
-        rise = numbers["peak_step"] - numbers["start_step"] - np.abs(at - numbers["peak_step"])
+        rise = np.minimum(at, numbers["peak_step"]) - numbers["start_step"] - np.maximum(at - numbers["fall_step"], 0.0)
         return np.asarray(p["normal_stress"] * 2.0 ** (rise / numbers["octave_steps"]))
 
     now = rows["step"] > numbers["start_step"]
@@ -72,7 +73,7 @@ def read(replica: Replica) -> Loading:
     stress = np.array([one.stress for one in found])
     return Loading(load(steps), stress[:, 2, 2], 0.5 * (stress[:, 0, 0] + stress[:, 1, 1]), np.array([one.fraction for one in found]),
                 np.array([one.coordination for one in found]), np.log(height[0] / height), int(np.argmax(steps >= numbers["peak_step"])),
-                rows["lower_fz"][now] / due, -rows["upper_fz"][now] / due)
+                   int(np.argmax(steps >= numbers["fall_step"])), rows["lower_fz"][now] / due, -rows["upper_fz"][now] / due)
 
 
 def affine_modulus(pressure: Array, density: Array, p: Numbers) -> Array:
@@ -91,7 +92,7 @@ def affine_modulus(pressure: Array, density: Array, p: Numbers) -> Array:
 def moduli(test: Loading, p: Numbers) -> tuple[float, float]:
     """Pa, where the load begins to fall: slope of the stress in the strain over the first frame, in which few contacts slip, and the
     affine modulus."""
-    part = slice(test.peak, test.peak + 2)
+    part = slice(test.fall, test.fall + 2)
     pressure = np.mean(test.along[part] + 2.0 * test.across[part]) / 3.0
     density = np.mean(test.fraction[part] * test.coordination[part])
     slope = np.diff(test.load[part])[0] / np.diff(test.strain[part])[0]
@@ -101,19 +102,19 @@ def moduli(test: Loading, p: Numbers) -> tuple[float, float]:
 def estimates(replica: Replica) -> dict[str, Estimate]:
     """All that is measured of one run."""
     p, test = replica.parameters, read(replica)
-    each = p["frames"] // (2 * p["octaves"])
+    each = p["frames"] // (2 * p["octaves"] + 1)
     # The first doubling still remembers how the layer was made.
     loading, ratio = slice(each, test.peak + 1), test.across / test.along
     slope, affine = moduli(test, p)
     return {
         "k0": block_mean(ratio[loading]),
         "k0_unloaded": exact(float(ratio[-1])),
-        "compression": exact(float(test.strain[test.peak])),
+        "compression": exact(float(test.strain[test.fall])),
         "residual_compression": exact(float(test.strain[-1])),
         "modulus": exact(slope),
         "modulus_over_affine": exact(slope / affine),
         "solid_fraction": exact(float(test.fraction[0])),
-        "coordination": exact(float(test.coordination[test.peak])),
+        "coordination": exact(float(test.coordination[test.fall])),
         "normal_balance_error": max((block_mean(side - 1.0) for side in (test.lower, test.upper)), key=lambda one: abs(one.value)),
         "contact_stress_error": block_mean(test.along / test.load - 1.0),
     }
@@ -125,8 +126,9 @@ def measure(replicas: Replicas) -> Measurement:
     slippery = not replicas[0].derived["grain_static"]
     over = {name: pooled(found, name) for name in found[0]}
     values = {name: Value(one) for name, one in over.items()}
+    rearranged = "grains without friction, whose contacts have no tangential stiffness" if slippery else ""
     values["k0"] = Value(over["k0"], exact(1.0 - math.sin(math.atan(BEADS))), inapplicable="grains without friction" if slippery else "")
-    values["modulus_over_affine"] = Value(over["modulus_over_affine"], exact(1.0))
+    values["modulus_over_affine"] = Value(over["modulus_over_affine"], exact(1.0), inapplicable=rearranged)
     if p["grain_diameter_spread"] == 0.0 and (known := FRACTIONS.get(replicas[0].derived["grain_static"])) is not None:
         values["solid_fraction"] = Value(over["solid_fraction"], exact(known))
     for name in ("normal_balance_error", "contact_stress_error"):
@@ -137,8 +139,8 @@ def measure(replicas: Replicas) -> Measurement:
 def curves(replicas: Replicas) -> list[Curve]:
     """Stress and strain, and the stress across over that along; of loading and unloading."""
     tests = [read(replica) for replica in replicas]
-    load, peak = tests[0].load, tests[0].peak
-    ways = {"loading": slice(0, peak + 1), "unloading": slice(peak, None)}
+    load, peak, fall = tests[0].load, tests[0].peak, tests[0].fall
+    ways = {"loading": slice(0, peak + 1), "unloading": slice(fall, None)}
     strains = [profile(f"strain_{way}", f"Compression, {way}", "normal stress (Pa)", "ln(h₀/h)", load[part],
                        [test.strain[part] for test in tests]) for way, part in ways.items()]
     ratios = [profile(f"k0_{way}", f"Stress across over stress along, {way}", "normal stress (Pa)", "σ_h / σ_v", load[part],

@@ -104,9 +104,9 @@ def estimates(replica: Replica) -> dict[str, Estimate]:
         "cohesion_ratio": fitted(cut, float(normal.mean())),
         "capillary_cohesion": Estimate(friction.value * pull, friction.half * pull, friction.basis),
         "bead_friction": exact(float(slope @ (normal * [bead_friction(one) for one in inertial]))),
-        "normal_balance_error": worst([block_mean((one.lower_normal - one.load) / one.load) for one in loads]
-                                      + [block_mean((one.upper_normal - one.load) / one.load) for one in loads]),
-        "shear_balance_error": worst([block_mean((one.lower_shear - one.upper_shear) / one.load) for one in loads]),
+        "normal_balance_error": max((of_loads([getattr(one, side) / one.load - 1.0 for one in loads])
+                                     for side in ("lower_normal", "upper_normal")), key=lambda one: abs(one.value)),
+        "shear_balance_error": of_loads([(one.lower_shear - one.upper_shear) / one.load for one in loads]),
         "contact_stress_error": block_mean(ratios - 1.0),
         "solid_fraction": block_mean(np.array([frame.fraction for one in loads for frame in one.frames])),
         "coordination": block_mean(np.array([frame.coordination for one in loads for frame in one.frames])),
@@ -114,9 +114,10 @@ def estimates(replica: Replica) -> dict[str, Estimate]:
     }
 
 
-def worst(errors: Sequence[Estimate]) -> Estimate:
-    """That which is farthest from zero."""
-    return max(errors, key=lambda one: abs(one.value))
+def of_loads(errors: Sequence[Array]) -> Estimate:
+    """The mean over all loads of what was measured under each."""
+    means = [block_mean(one) for one in errors]
+    return Estimate(float(np.mean([one.value for one in means])), combined([one.half for one in means]) / len(means), means[0].basis)
 
 
 def inertial_numbers(replica: Replica) -> Array:

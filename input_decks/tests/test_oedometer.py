@@ -22,12 +22,13 @@ def compressed(*, k0: float = 0.64, loose: float = 0.0, power: float = 1.0 / 3.0
     """A run of a cubic lattice of grains between two plates. The stress across is `k0` of that along; the modulus on loading and unloading
     goes as the stress to this `power`, and is `stiffness` times the affine one at the peak. `carried`: share of the load that the grains
     carry; `loose`: their solid fraction."""
-    p = defaults("oedometer", **{"octaves": 3, "frames": 48} | changes)
+    p = defaults("oedometer", **{"octaves": 3, "frames": 56} | changes)
     peak, every = START + p["octaves"] * OCTAVE, 50
-    steps = peak + p["octaves"] * OCTAVE
+    fall = peak + OCTAVE
+    steps = fall + p["octaves"] * OCTAVE
 
     def load(step: Any) -> Any:
-        return p["normal_stress"] * 2.0 ** ((peak - START - np.abs(step - peak)) / OCTAVE)
+        return p["normal_stress"] * 2.0 ** ((np.minimum(step, peak) - START - np.maximum(step - fall, 0)) / OCTAVE)
 
     rows = np.arange(every, steps + 1, every)
     force = carried * load(rows - 0.5 * every) * AREA
@@ -66,7 +67,8 @@ def compressed(*, k0: float = 0.64, loose: float = 0.0, power: float = 1.0 / 3.0
                                                ids=np.column_stack([first, second]) + 1)))
     return SimpleNamespace(parameters=p, time_step=1e-5, times=lambda: times, grains=lambda: [one for one, _ in frames],
                            paired_frames=lambda: iter(frames),
-                           derived={"area": AREA, "start_step": START, "peak_step": peak, "octave_steps": OCTAVE, "every": every,
+                           derived={"area": AREA, "start_step": START, "peak_step": peak, "fall_step": fall, "octave_steps": OCTAVE,
+                                    "every": every,
                                     "grain_static": p["grain_friction"]})
 
 
@@ -128,7 +130,7 @@ def test_grains_without_friction_have_no_angle_to_compare_with() -> None:
     assert verdicts(grain_friction=0.0)["k0"]["reason"] == "grains without friction"
 
 
-TINY = {"grain_count": 150, "cell_length": 0.005, "cell_width": 0.004, "octaves": 2, "octave_time": 0.02, "rest_time": 0.02, "frames": 32}
+TINY = {"grain_count": 150, "cell_length": 0.005, "cell_width": 0.004, "octaves": 2, "octave_time": 0.02, "rest_time": 0.02, "frames": 40}
 
 
 @pytest.mark.parametrize("engine", ["liggghts", *(pytest.param(one, marks=pytest.mark.full) for one in ("lammps", "yade"))])
