@@ -23,17 +23,18 @@ D, STRIDE = 0.005, 10
 SITES = np.array([((i + 0.5) * D, 0.0, (k + 0.5) * D) for i in range(20) for k in range(12)])
 
 
-def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: float = 0.0, **changes: Any) -> Any:
-    """A run in which `swaps` pairs of grains change places in each period. `rising`: way (d) of the large grains in a period; `drift`:
-    vertical way of the grains at the walls in a period."""
+def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: float = 0.0, single: int = 9 * 12, **changes: Any) -> Any:
+    """A run in which `swaps` pairs of grains change places in each period. `rising`: way (d) of the grains of the second sort in a period;
+    `drift`: vertical way of the grains at the walls in a period; `single`: site of a single large grain."""
     given = defaults("vibro_mixing", **{"periods": 20, "grain_count": len(SITES)} | changes)
     random, count = np.random.default_rng(3), len(SITES)
     large = np.zeros(count, bool)
-    if given["mixture"] == "two_sizes":
+    if given["mixture"] == "two_sorts":
         large[random.permutation(count)[:40]] = True
     elif given["mixture"] == "intruder":
-        large[9 * 12] = True
+        large[single] = True
     radii = 0.5 * D * np.where(large, given["size_ratio"], 1.0)
+    masses = given["grain_density"] * np.where(large, given["density_ratio"], 1.0) * 4.0 / 3.0 * np.pi * radii**3
     place, near = np.arange(count), np.minimum(SITES[:, 0], 0.1 - SITES[:, 0]) < 2.0 * D
     frames = []
     for number in range(given["periods"] * PHASES + 1):
@@ -42,7 +43,8 @@ def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: fl
             place[pairs] = place[pairs[::-1]]
         at = SITES[place] + [0.0, 0.0, 0.5 * D * math.sin(2.0 * math.pi * number / PHASES)]
         at[:, 2] += D * (number / PHASES) * (rising * large + drift * near)
-        one = SimpleNamespace(step=STRIDE * number, positions=at, radii=radii, types=np.ones(count), ids=np.arange(count), where="")
+        one = SimpleNamespace(step=STRIDE * number, positions=at, radii=radii, masses=masses, types=np.ones(count), ids=np.arange(count),
+                              where="")
         one.select = lambda _, same=one: same
         frames.append(one)
     rows = {name: np.zeros(300) for name in ("other", "imposed")} | {"balance": np.full(300, lost), "scale": np.ones(300)}
@@ -50,12 +52,16 @@ def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: fl
                            times=lambda: rows)
 
 
-def verdicts(**changes: Any) -> dict[str, Any]:
-    return judged("vibro_mixing", mixing.measure([shaken(**changes)]))
+def verdicts(packings: int = 1, **changes: Any) -> dict[str, Any]:
+    return judged("vibro_mixing", mixing.measure([shaken(**changes)] * packings))
+
+
+DENSE = {"mixture": "two_sorts", "size_ratio": 1.0, "density_ratio": 3.0}
 
 
 def test_equal_grains_mix() -> None:
     found = verdicts()
+    assert found["wall_drift"]["verdict"] == "info" and "holds 0" in found["wall_drift"]["reason"]
     assert {"energy_balance", "index_separated", "index_random", "segregation_labels"} == names(found, "pass")
     assert not names(found, "fail") and found["index_sides"]["value"] > 0.5
     # A grain changes its place in one of twelve periods; then it is anywhere.
@@ -74,9 +80,33 @@ def test_a_large_grain_rises_at_its_speed() -> None:
 
 
 def test_large_grains_that_rise_segregate() -> None:
-    found = verdicts(swaps=0, mixture="two_sizes", rising=0.1)
+    found = verdicts(swaps=0, mixture="two_sorts", rising=0.1)
     assert found["segregation_rate"]["value"] > 0.003 and found["segregation_end"]["value"] > found["segregation_start"]["value"] + 0.05
     assert "segregation_change" not in found
+
+
+def test_dense_grains_are_told_from_light_ones_of_their_size() -> None:
+    found = verdicts(3, swaps=0, rising=-0.1, **DENSE)
+    assert found["segregation_end"]["verdict"] == "pass" and found["segregation_end"]["value"] < -0.05
+
+
+def test_one_packing_says_nothing_of_the_sign() -> None:
+    assert verdicts(swaps=0, rising=-0.1, **DENSE)["segregation_end"]["verdict"] == "info"
+    assert verdicts(3, swaps=0, rising=-0.1, **DENSE, motion_gamma=0.8)["segregation_end"]["verdict"] == "info"
+
+
+def test_large_and_dense_grains_have_no_source() -> None:
+    assert verdicts(3, swaps=0, rising=-0.1, **DENSE | {"size_ratio": 2.0})["segregation_end"]["verdict"] == "info"
+
+
+def test_the_dense_grains_of_a_set_up() -> None:
+    case = find("vibro_mixing")
+    packed = deck.prepare(case, resolve(case, "quick", "densities")).packing
+    assert packed is not None
+    dense = packed.densities > 5000.0
+    assert dense.sum() == 100 and set(packed.densities) == {2500.0, 7500.0} and np.ptp(packed.diameters) < 0.3 * D
+    # At any place.
+    assert abs(np.corrcoef(dense, packed.positions[:, 2])[0, 1]) < 0.3
 
 
 @pytest.mark.parametrize(("variant", "large"), [("halves", 0), ("sizes", 40), ("intruder", 1)])
@@ -114,7 +144,13 @@ def controls_vibro_mixing(_folder: Path) -> Iterator[Control]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mixing, "random_labels", lambda _, kinds: kinds)
         yield Control("labels that follow the place", right, verdicts(swaps=0))
-    weak = {"swaps": 0, "mixture": "two_sizes", "motion_gamma": 0.8}
+    weak = {"swaps": 0, "mixture": "two_sorts", "motion_gamma": 0.8}
     yield Control("large grains that rise in a vessel that never throws them", verdicts(**weak), verdicts(**weak, rising=0.02))
+    yield Control("sorts that change places", verdicts(3, swaps=0, mixture="two_sorts", rising=0.1),
+                  verdicts(3, swaps=0, mixture="two_sorts", rising=-0.1))
+    yield Control("sorts that change places", verdicts(3, swaps=0, **DENSE, rising=-0.1), verdicts(3, swaps=0, **DENSE, rising=0.1))
+    middle = {"swaps": 0, "mixture": "intruder", "single": 9 * 12 + 6}
+    yield Control("a large grain that sinks", verdicts(**middle, rising=0.05), verdicts(**middle, rising=-0.05))
+    yield Control("walls that drag upwards", verdicts(swaps=0, drift=-0.1), verdicts(swaps=0, drift=0.1))
     smooth = {"swaps": 0, "wall_friction": 0.0}
     yield Control("smooth walls that drag", verdicts(**smooth), verdicts(**smooth, drift=-0.1))

@@ -1,5 +1,7 @@
 """Mixing and segregation in a vibrated vessel, at one phase of each period, at which the bed lies on the floor."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,7 +9,8 @@ from dembark.input_decks.common.drive_levels import acceleration
 from dembark.input_decks.common.drive_phases import Phases, read_phases
 from dembark.input_decks.common.estimates import over_chaotic
 from dembark.input_decks.common.momentum import unexplained_energy
-from dembark.postproc.measurement import Curve, Measurement, Numbers, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.grains import GrainFrame
+from dembark.postproc.measurement import Curve, Estimate, Measurement, Numbers, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.replica import Array, Replica, cached_per_replica
 
 from .mixing import SAMPLE, Kinds, cells, lacey_index, lower_half, mixing_rate, rate, samples, segregation, wall_drift
@@ -36,14 +39,29 @@ def measure(replicas: Replicas) -> Measurement:
               "wall_drift": Value(drift)}
     if p["wall_friction"] == 0.0 and p["static_friction"] is None:
         values["wall_drift_smooth"] = Value(drift, exact(0.0))
+    elif acceleration(p) > 1.0:
+        values["wall_drift"] = of_sign(drift, -1)
     tracks = [places(one) for one in runs]
     if p["mixture"] == "equal":
         found, curves = equal(tracks, p["grain_diameter"])
     else:
-        between = 0.25 * p["grain_diameter"] * (1.0 + p["size_ratio"])
-        large = [one.frames[0].radii > between for one in runs]
-        found, curves = unequal(tracks, large, p)
+        found, curves = unequal(tracks, [second_sort(one.frames[0], p) for one in runs], p)
     return Measurement(values | found, curves)
+
+
+def second_sort(frame: GrainFrame, p: Numbers) -> Kinds:
+    """Which grains (n,) are denser than the others or, with one density, larger."""
+    if p["density_ratio"] > 1.0:
+        densities = frame.masses / (4.0 / 3.0 * math.pi * frame.radii**3)
+        return np.asarray(densities > math.sqrt(p["density_ratio"]) * p["grain_density"])
+    return np.asarray(frame.radii > 0.25 * p["grain_diameter"] * (1.0 + p["size_ratio"]))
+
+
+def of_sign(found: Estimate, sign: int) -> Value:
+    """`found`, of which the source states the `sign` alone: passes where all of its interval has it, fails where all has the other."""
+    if not abs(found.value) > found.half:
+        return Value(found, reason="its interval holds 0")
+    return Value(found, verdict="pass" if sign * found.value > 0.0 else "fail")
 
 
 def equal(tracks: list[Array], diameter: float) -> tuple[dict[str, Value], list[Curve]]:
@@ -89,15 +107,19 @@ def unequal(tracks: list[Array], large: list[Kinds], p: Numbers) -> tuple[dict[s
         rising = [one[: found[0]] if len(found) else one for one, found in zip(heights, there, strict=True)]
         values = {"rise": Value(over_chaotic(float(one[-1] - one[0]) for one in heights)),
                   "rise_rate": Value(over_replicas([rate(one) for one in rising]))}
+        if p["density_ratio"] == 1.0:
+            values["rise_rate"] = of_sign(values["rise_rate"].estimate, 1)
         return values, [curve("rise", "Height of the large grain", "height over the lowest grain (d)", heights)]
     parted = [np.array([segregation(kinds, frame[:, 1]) for frame in track]) for track, kinds in zip(tracks, large, strict=True)]
     values = {"segregation_start": Value(over_chaotic(float(one[0]) for one in parted)),
               "segregation_end": Value(over_chaotic(float(one[-1]) for one in parted)),
               "segregation_rate": Value(over_replicas([rate(one) for one in parted]))}
+    if acceleration(p) > 1.0 and (p["size_ratio"] == 1.0 or p["density_ratio"] == 1.0):
+        values["segregation_end"] = of_sign(values["segregation_end"].estimate, 1 if p["density_ratio"] == 1.0 else -1)
     if acceleration(p) < 1.0:
         change = max((float(one[-1] - one[0]) for one in parted), key=abs)
         values["segregation_change"] = Value(exact(change), exact(0.0))
-    return values, [curve("segregation", "Segregation", "(z̄ large − z̄ small)/H", parted)]
+    return values, [curve("segregation", "Segregation", "(z̄ of the second sort − z̄ of the others)/H", parted)]
 
 
 def curve(name: str, title: str, across: str, series: list[Array]) -> Curve:

@@ -18,7 +18,8 @@ def setup(p: Parameters) -> Setup:
     still = math.ceil(p.settle_time * frequency)
     moving = motion(p, start=still / frequency)
     speed = 2.0 * math.pi * frequency * amplitude(p)
-    step, numbers = fixed_phases(frequency, suitable_step(p, speed), still + math.ceil(p.motion_ramp), p.periods, rows=2)
+    suitable = min(suitable_step(sort, speed) for sort in (p, second_material(p)))
+    step, numbers = fixed_phases(frequency, suitable, still + math.ceil(p.motion_ramp), p.periods, rows=2)
     biggest = packing.largest(p) * (1.0 if p.mixture == "equal" else p.size_ratio)
     reach = amplitude(p)
     margin = 0.15 * biggest
@@ -29,17 +30,23 @@ def setup(p: Parameters) -> Setup:
     grains = packing.grains(p, sites, box)
     if p.dimensions == 2:
         grains = replace(grains, positions=grains.positions * [1, 0, 1] + [0, 0.5 * p.vessel_depth, 0])
-    large = large_grains(p, grains)
-    grains = replace(grains, diameters=np.where(large, p.size_ratio, 1.0) * grains.diameters)
+    second = second_sort(p, grains)
+    grains = replace(grains, diameters=np.where(second, p.size_ratio, 1.0) * grains.diameters,
+                     densities=np.where(second, p.density_ratio, 1.0) * grains.densities)
     walls = {"vessel": vessel(p, reach, top)}
     return Setup(numbers["steps"], step, grains, {**numbers, **contacts(p, skin=0.2)}, walls, {"motion_words": moving.words})
 
 
-def large_grains(p: Parameters, grains: packing.Packing) -> NDArray[np.bool_]:
-    """Which grains (n,) are large: none, some by the seed, or the lowest one nearest to the middle."""
+def second_material(p: Parameters) -> Parameters:
+    """The parameters with the density of the second sort, whose grains press deeper into each other."""
+    return Parameters(**{**vars(p), "grain_density": p.density_ratio * p.grain_density})
+
+
+def second_sort(p: Parameters, grains: packing.Packing) -> NDArray[np.bool_]:
+    """Which grains (n,) are large or dense: none, some by the seed, or the lowest one nearest to the middle."""
     count = len(grains.diameters)
-    if p.mixture == "two_sizes":
-        return packing.rank(count, p.seed) < round(p.large_part * count)
+    if p.mixture == "two_sorts":
+        return packing.rank(count, p.seed) < round(p.second_part * count)
     found = np.zeros(count, bool)
     if p.mixture == "intruder":
         off = np.abs(grains.positions[:, 0] - 0.5 * p.vessel_width)
