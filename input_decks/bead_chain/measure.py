@@ -1,4 +1,4 @@
-"""Bead chain: when the wave passes two contacts, and with which force."""
+"""Bead chain: when the wave passes two contacts, and with which force; in a layer, how the front passes the rows."""
 
 import math
 
@@ -33,8 +33,46 @@ def peak(times: Array, force: Array) -> tuple[float, float]:
 
 
 def measure(replicas: Replicas) -> Measurement:
-    """Speed and force of the wave of the one run: nothing is random."""
-    run = replicas[0]
+    """Speed of the wave or the front of the one run: nothing is random."""
+    return wave(replicas[0]) if replicas[0].parameters["columns"] == 1 else front(replicas[0])
+
+
+def front(run: Replica) -> Measurement:
+    """Speed and shape of the front in a layer."""
+    p, frames = run.parameters, list(run.grains())
+    rows, turn = p["grain_count"], run.derived["row_frequency"]
+    times = run.time_step * np.array([frame.step for frame in frames])
+    speeds = np.array([frame.velocities[:, 0] for frame in frames]).reshape(len(frames), rows, p["columns"]) / (0.5 * p["hit_speed"])
+    due = lattice(rows, turn * times)
+    number = np.arange(rows // 2 + rows // 16, rows // 2 + rows // 5)
+    mean = speeds.mean(axis=2)
+    passed = np.array([arrival(times, mean[:, k]) for k in number])
+    return Measurement({
+        "front_speed": Value(exact(float(np.polyfit(passed, number, 1)[0]) / turn), exact(1.0)),
+        "front_profile": Value(exact(float(np.abs(speeds - due[:, :, None]).max())), exact(0.0))},
+        [profile("front", "Speeds of the rows at the end", "row", "speed over that behind the front", np.arange(1.0, rows + 1.0),
+                 [mean[-1]], reference=due[-1], reference_label="harmonic lattice")])
+
+
+def lattice(rows: int, phases: Array) -> Array:
+    """Speeds (times, rows) over those behind the front, of rows in a ring of which the first half has the speed 2, at the `phases` Omega t
+    (times,): each wave of the phase q from row to row swings with 2 Omega |sin(q/2)|."""
+    start = np.fft.rfft(np.where(np.arange(rows) < rows // 2, 2.0, 0.0))
+    turns = 2.0 * np.sin(np.pi * np.arange(len(start)) / rows)
+    return np.asarray(np.fft.irfft(start * np.cos(np.outer(phases, turns)), rows))
+
+
+def arrival(times: Array, speed: Array) -> float:
+    """Time (s) at which `speed` (n,) first is a third of that behind the front, NaN if never: a third, the
+    integral of Airy's function over the part ahead, is what a front that spreads has at the place of the long waves."""
+    k = int(np.argmax(speed > 1.0 / 3.0))
+    if k == 0:
+        return math.nan
+    return float(times[k - 1] + (1.0 / 3.0 - speed[k - 1]) / (speed[k] - speed[k - 1]) * (times[k] - times[k - 1]))
+
+
+def wave(run: Replica) -> Measurement:
+    """Speed and force of the wave in a row."""
     times, force = forces(run)
     near, far = (round(part * force.shape[1]) for part in (NEAR, FAR))
     (begun, first), (ended, last) = peak(times, force[:, near]), peak(times, force[:, far])

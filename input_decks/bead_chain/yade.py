@@ -1,9 +1,9 @@
-"""Bead chain: spheres that touch in a row; the first has a speed."""
+"""Bead chain: spheres that touch in a row, of which the first has a speed; or a hexagonal layer, of which half has one."""
 
 from yade import dembark
 
 p = dembark.parameters()
-materials, ids = dembark.begin(p)
+materials, ids = dembark.begin(p, along=[0, 2] if p.columns > 1 else [])
 writer = dembark.FrameWriter()
 
 

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.special import jv
 
+from dembark.input_decks.bead_chain.setup import hertz, row_frequency, sphere_mass
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.postproc.tests.packings import frame_of
 
@@ -45,6 +47,45 @@ def study(power: float) -> dict[str, dict[str, Any]]:
     return judged("bead_chain", chain.study("force", points, "hit_speed"))
 
 
+def passed(stiffer: float = 1.0) -> dict[str, dict[str, Any]]:
+    """A front in a layer whose springs are `stiffer` than stated."""
+    p, turn = defaults("bead_chain", grain_count=120, columns=4, hit_speed=2e-5), 2000.0
+    steps = 20 * np.arange(1, 121)
+    speeds = 1e-5 * chain.lattice(120, np.sqrt(stiffer) * turn * DT * steps)
+    frames = [frame_of(np.zeros((480, 3)), 0.5 * D, {}, step=int(step), velocities=np.repeat(speed, 4)[:, None] * [1.0, 0.0, 0.0])
+              for step, speed in zip(steps, speeds, strict=True)]
+    replica = SimpleNamespace(parameters=p, derived={"row_frequency": turn}, time_step=DT, grains=lambda: frames)
+    return judged("bead_chain", chain.measure([replica]))
+
+
+def test_a_known_front() -> None:
+    found = passed()
+    assert names(found, "pass") == {"front_speed", "front_profile"} and found["front_profile"]["value"] < 1e-12
+    assert passed(1.1)["front_speed"]["value"] == pytest.approx(1.1**0.5, rel=0.01)
+
+
+def test_rows_swing_as_in_an_endless_lattice_until_the_fronts_meet() -> None:
+    """Of a row that is given a speed the n-th next has J_2n(2 Omega t) of it (Schroedinger 1914)."""
+    phases = np.linspace(0.0, 20.0, 9)
+    due = [[sum(jv(2 * m, 2.0 * phase) for m in range(n, 60)) for n in range(1, 11)] for phase in phases]
+    np.testing.assert_allclose(0.5 * chain.lattice(200, phases)[:, 100:110], due, atol=1e-12)
+
+
+def test_rows_are_as_stiff_as_their_contacts() -> None:
+    """The force on a row that is moved along x between two at rest, -2 m Omega^2 x a sphere, from the contacts of a sphere with both
+    neighbours in either row."""
+    p = SimpleNamespace(**defaults("bead_chain", columns=4))
+    a, moved = p.grain_diameter - p.overlap, 1e-4 * p.overlap
+    force = 0.0
+    for x, z in ((s * 0.75**0.5 * a, 0.5 * t * a) for s in (-1, 1) for t in (-1, 1)):
+        apart = np.hypot(moved - x, z)
+        force += hertz(p) * (p.grain_diameter - apart) ** 1.5 * (moved - x) / apart
+    assert 2.0 * row_frequency(p) ** 2 == pytest.approx(-force / moved / sphere_mass(p), rel=1e-6)
+    # Speed of long waves over a sqrt(K/m).
+    stiff = 1.5 * hertz(p) * p.overlap**0.5
+    assert 0.75 * row_frequency(p) ** 2 == pytest.approx(9.0 / 8.0 * stiff / sphere_mass(p), rel=1e-3)
+
+
 def test_a_known_wave() -> None:
     found = verdicts()
     assert names(found, "pass") == {"wave_speed", "wave_decay"}
@@ -58,8 +99,15 @@ def test_the_wave_in_an_engine(engine: str, simulate: Any) -> None:
     assert names(found, "pass") == {"wave_speed", "wave_decay"}, found
 
 
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_the_front_in_an_engine(engine: str, simulate: Any) -> None:
+    found = judged("bead_chain", chain.measure([simulate("bead_chain", engine, {"grain_count": 80, "frames": 100}, "front")]))
+    assert names(found, "pass") == {"front_speed", "front_profile"}, found
+
+
 def controls_bead_chain(_folder: Path) -> Iterator[Control]:
     right = verdicts()
     yield Control("spheres a fiftieth too heavy", right, verdicts(heavier=1.02))
     yield Control("a contact that dissipates part of its energy", right, verdicts(lost=1e-3))
     yield Control("a spring of Hooke's law", study(1.0 / 6.0), study(0.0))
+    yield Control("springs a tenth too stiff", passed(), passed(1.1))
