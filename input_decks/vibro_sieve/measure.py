@@ -1,6 +1,7 @@
 """Vibrating screen: grains that have passed, period by period, and the rate at which those that are left pass."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +29,21 @@ from dembark.postproc.studies import measured
 Counts = NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class Screening:
+    """One run: undersize grains `on` the screen (periods + 1,) at the beginning of each period and at the end; `coverage`: diameters of
+    all grains on the screen at the beginning over its width; the most oversize grains `through` the screen in any frame; grains `lost`
+    from the bin in the last frame."""
+
+    on: Counts
+    coverage: float
+    through: int
+    lost: int
+
+
 @cached_per_replica
-def read(replica: Replica) -> tuple[Counts, int, int]:
-    """Undersize grains on the screen (periods + 1,) at the beginning of each period and at the end; the most oversize grains below the
-    screen in any frame; grains that are not in the bin in the last frame."""
+def read(replica: Replica) -> Screening:
+    """What the frames of a run show."""
     p, derived = replica.parameters, replica.derived
     run = read_phases(replica.grains(), derived["period_steps"], replica.time_step)
     oversize = run.frames[0].radii > 0.25 * p["grain_diameter"] * (1.0 + p["oversize_ratio"])
@@ -39,7 +51,8 @@ def read(replica: Replica) -> tuple[Counts, int, int]:
     on = np.array([np.sum(~passed & ~oversize) for passed, phase in zip(below, run.phases, strict=True) if phase == 0])
     x, z = run.frames[-1].positions[:, 0], run.frames[-1].positions[:, 2]
     inside = (x > 0.0) & (x < derived["width"]) & (z > -p["drop"])
-    return on, max(int(np.sum(passed & oversize)) for passed in below), p["grain_count"] - int(inside.sum())
+    coverage = 2.0 * float(run.frames[0].radii[~below[0]].sum()) / derived["width"]
+    return Screening(on, coverage, max(int(np.sum(passed & oversize)) for passed in below), p["grain_count"] - int(inside.sum()))
 
 
 def rate(on: Counts) -> float:
@@ -64,17 +77,20 @@ def measure(replicas: Replicas) -> Measurement:
     """Values and curves from all packings."""
     p, runs = replicas[0].parameters, [read(replica) for replica in replicas]
     undersize = p["grain_count"] - round(p["oversize_part"] * p["grain_count"])
-    counts = [on for on, _, _ in runs]
+    counts = [one.on for one in runs]
     found = over_chaotic(rate(on) for on in counts)
     chance = Estimate(1.0 - math.exp(-found.value), math.exp(-found.value) * found.half, found.basis)
+    coverage = over_chaotic(one.coverage for one in runs)
+    crowded = "grains lie on each other, and wait" if coverage.value > 1.0 else ""
     values = {
         "energy_balance": number(max(unexplained_energy(replica.times()) for replica in replicas), 0.0),
-        "oversize_passed": number(sum(through for _, through, _ in runs), 0.0),
-        "grains_lost": number(sum(lost for _, _, lost in runs), 0.0),
+        "oversize_passed": number(sum(one.through for one in runs), 0.0),
+        "grains_lost": number(sum(one.lost for one in runs), 0.0),
         "start": Value(over_chaotic(on[0] / undersize for on in counts)),
+        "coverage": Value(coverage),
         "passed": Value(over_chaotic(1.0 - on[-1] / on[0] for on in counts)),
         "rate": Value(found),
-        "order": Value(over_chaotic(halves_ratio(on) for on in counts), exact(1.0)),
+        "order": Value(over_chaotic(halves_ratio(on) for on in counts), exact(1.0), inapplicable=crowded),
         "chance": above(chance, random_chance(p)),
     }
     time = np.arange(len(counts[0]), dtype=float)
