@@ -81,6 +81,7 @@ def measure(replicas: Replicas) -> Measurement:
     found = over_chaotic(rate(on) for on in counts)
     chance = Estimate(1.0 - math.exp(-found.value), math.exp(-found.value) * found.half, found.basis)
     coverage = over_chaotic(one.coverage for one in runs)
+    # Fewer than three packings have no interval, without which the ratio decides nothing.
     crowded = "grains lie on each other, and wait" if coverage.value > 1.0 else ""
     values = {
         "energy_balance": number(max(unexplained_energy(replica.times()) for replica in replicas), 0.0),
@@ -90,7 +91,7 @@ def measure(replicas: Replicas) -> Measurement:
         "coverage": Value(coverage),
         "passed": Value(over_chaotic(1.0 - on[-1] / on[0] for on in counts)),
         "rate": Value(found),
-        "order": Value(over_chaotic(halves_ratio(on) for on in counts), exact(1.0), inapplicable=crowded),
+        "order": Value(over_chaotic(halves_ratio(on) for on in counts), exact(1.0) if len(counts) > 2 else None, inapplicable=crowded),
         "chance": above(chance, random_chance(p)),
     }
     time = np.arange(len(counts[0]), dtype=float)
