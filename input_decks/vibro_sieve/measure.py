@@ -65,7 +65,8 @@ def rate(on: Counts) -> float:
 def halves_ratio(on: Counts) -> float:
     """Rate after half of the passages over that before."""
     middle = int(np.searchsorted(on[0] - on, 0.5 * (on[0] - on[-1])))
-    return rate(on[middle:]) / rate(on[: middle + 1])
+    before = rate(on[: middle + 1])
+    return rate(on[middle:]) / before if before > 0.0 else math.nan
 
 
 def random_chance(p: Numbers) -> float:
@@ -81,6 +82,7 @@ def measure(replicas: Replicas) -> Measurement:
     found = over_chaotic(rate(on) for on in counts)
     chance = Estimate(1.0 - math.exp(-found.value), math.exp(-found.value) * found.half, found.basis)
     coverage = over_chaotic(one.coverage for one in runs)
+    order = over_chaotic(halves_ratio(one.on) for one in runs)
     # Fewer than three packings have no interval, without which the ratio decides nothing.
     crowded = "grains lie on each other, and wait" if coverage.value > 1.0 else ""
     values = {
@@ -91,7 +93,7 @@ def measure(replicas: Replicas) -> Measurement:
         "coverage": Value(coverage),
         "passed": Value(over_chaotic(1.0 - on[-1] / on[0] for on in counts)),
         "rate": Value(found),
-        "order": Value(over_chaotic(halves_ratio(on) for on in counts), exact(1.0) if len(counts) > 2 else None, inapplicable=crowded),
+        "order": Value(order, exact(1.0) if len(counts) > 2 and math.isfinite(order.value) else None, inapplicable=crowded),
         "chance": above(chance, random_chance(p)),
     }
     time = np.arange(len(counts[0]), dtype=float)
