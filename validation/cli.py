@@ -16,7 +16,7 @@ from dembark.common.extras import missing_extra
 from dembark.common.parallel import cores_here
 from dembark.common.units import seconds
 from dembark.postproc import cli as postproc
-from dembark.validation import doctor, engines, provenance, show
+from dembark.validation import body, doctor, engines, provenance, show
 from dembark.validation.campaigns import fitted
 from dembark.validation.campaigns.plan import Resources, predicted, series
 from dembark.validation.case import cli as cases
@@ -176,6 +176,7 @@ def make_report(
 
 app.add_typer(cases.app)
 app.add_typer(campaigns.app)
+app.add_typer(body.app)
 
 
 @app.command("doctor")

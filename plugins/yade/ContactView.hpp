@@ -24,8 +24,11 @@ inline Vector3r imageDrift(const Scene& scene, const Vector3i& cellDist) {
 	return crosses(scene, cellDist) ? scene.cell->intrShiftVel(cellDist) : Vector3r::Zero();
 }
 
-/// Mass (kg) against contacts: infinite of a body that is not dynamic.
-inline double inertialMass(const Body& body) { return body.isDynamic() ? body.state->mass : INFINITY; }
+/// Mass (kg) against contacts: infinite of a body that is not dynamic; of a clump's member that of the clump, which is what moves.
+inline double inertialMass(const Body& body) {
+	const Body& moved = body.isClumpMember() ? *Body::byId(body.clumpId) : body;
+	return moved.isDynamic() ? moved.state->mass : INFINITY;
+}
 
 /// Bodies 1 and 2 of `bodies` are YADE's of two spheres; of a sphere and a wall body 1 is always the sphere.
 struct ContactView {

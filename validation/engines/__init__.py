@@ -15,13 +15,13 @@ from functools import cache
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 
-from .base import CAPABILITIES, DeckNumber, Engine, EngineFacts, call, end_with_parent, mpi_launcher
+from .base import CAPABILITIES, DeckNumber, Engine, EngineFacts, RigidBody, call, end_with_parent, mpi_launcher
 from .lammps import Lammps
 from .liggghts import Liggghts
 from .yade import Yade
 
-__all__ = ["CAPABILITIES", "ENGINES", "DeckNumber", "Engine", "EngineFacts", "absent", "call", "end_with_parent", "engine_class", "facts",
-           "find", "mpi_launcher", "names", "titles"]
+__all__ = ["CAPABILITIES", "ENGINES", "DeckNumber", "Engine", "EngineFacts", "RigidBody", "absent", "call", "end_with_parent",
+           "engine_class", "facts", "find", "mpi_launcher", "names", "titles"]
 
 ENGINES: tuple[type[Engine], ...] = (Liggghts, Yade, Lammps)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import re
 import shlex
@@ -119,6 +120,36 @@ class DeckNumber:
 
 
 @dataclass(frozen=True)
+class RigidBody:
+    """A rigid body of spheres: mass (kg), inertia (kg m², three rows) about the centre of mass, which is at `centre` (m), and the spheres,
+    (x, y, z, radius) from there (m). Axes are along x, y and z. `lattice`: whether the spheres are points of a cubic lattice."""
+
+    name: str
+    mass: float
+    inertia: tuple[tuple[float, float, float], ...]
+    centre: tuple[float, float, float]
+    spheres: tuple[tuple[float, float, float, float], ...]
+    principal: bool
+    lattice: bool
+
+    @property
+    def density(self) -> float:
+        """kg/m³, of spheres whose masses add up to that of the body."""
+        return self.mass / sum(4.0 / 3.0 * math.pi * radius**3 for *_, radius in self.spheres)
+
+    @property
+    def moments(self) -> tuple[float, ...]:
+        """xx, yy, zz, xy, xz, yz of the inertia."""
+        one = self.inertia
+        return one[0][0], one[1][1], one[2][2], one[0][1], one[0][2], one[1][2]
+
+    def about(self) -> str:
+        """For the first line of its files."""
+        return (f"Written by dembark; SI units. {self.name}: a rigid body of {len(self.spheres)} spheres, with the mass and the inertia of "
+                "its surface's inside.")
+
+
+@dataclass(frozen=True)
 class Engine(ABC):
     """An engine that was found: `identity` changes when the program or dembark's part of it is rebuilt differently."""
 
@@ -135,6 +166,11 @@ class Engine(ABC):
     @abstractmethod
     def deck_text(cls, source: str, numbers: Mapping[str, DeckNumber], folders: Sequence[Path]) -> str:
         """The deck that runs, from its `source` in a case folder: with all numbers, and what it includes from `folders` in its place."""
+
+    @classmethod
+    @abstractmethod
+    def body_files(cls, body: RigidBody) -> dict[str, str]:
+        """Files, by name, from which its decks take the body."""
 
     @classmethod
     def locate(cls) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -48,3 +48,8 @@ class InputScript(Engine):
         launcher = [*self.launcher(ranks), *end_with_parent("KILL")] if ranks > 1 else []
         variables = (word for key, value in texts(values).items() for word in ("-var", key, value))
         return [*launcher, str(self.executable), "-in", str(deck), "-log", "none", *variables]
+
+
+def row(numbers: Iterable[float]) -> str:
+    """Numbers of a line, with all their digits."""
+    return " ".join(repr(float(number)) for number in numbers)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterable
@@ -9,8 +10,8 @@ from pathlib import Path
 
 from dembark.common.errors import DembarkError
 
-from .base import EngineFacts
-from .input_script import InputScript
+from .base import EngineFacts, RigidBody
+from .input_script import InputScript, row
 from .lammps_package import Package
 
 
@@ -18,6 +19,19 @@ class Lammps(InputScript):
     """LAMMPS's input script; MPI ranks of the MPICH that LAMMPS was built with."""
 
     facts = EngineFacts.read("lammps")
+
+    @classmethod
+    def body_files(cls, body: RigidBody) -> dict[str, str]:
+        """See Engine: a molecule, and the file `infile` of `fix rigid/small` for one at the body's centre."""
+        sections = {"Coords": (sphere[:3] for sphere in body.spheres), "Diameters": ([2.0 * sphere[3]] for sphere in body.spheres),
+                    "Masses": ([body.density * 4.0 / 3.0 * math.pi * sphere[3] ** 3] for sphere in body.spheres)}
+        lines = [f"# {body.about()}", "", f"{len(body.spheres)} atoms", f"{body.mass!r} mass", "0 0 0 com", f"{row(body.moments)} inertia"]
+        for title, rows in sections.items():
+            lines += ["", title, "", *(f"{number} {row(one)}" for number, one in enumerate(rows, 1))]
+        lines += ["", "Types", "", *(f"{number} 1" for number in range(1, len(body.spheres) + 1))]
+        # The number of the molecule, that of the first which create_atoms makes; no velocity, no angular momentum, no image flags.
+        made = f"1 {body.mass!r} {row(body.centre)} {row(body.moments)} 0 0 0 0 0 0 0 0 0"
+        return {f"{body.name}.mol": "\n".join(lines) + "\n", f"{body.name}.infile": f"# {body.about()}\n1\n{made}\n"}
 
     @classmethod
     def locate(cls) -> Path:

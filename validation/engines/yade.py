@@ -9,17 +9,62 @@ from pathlib import Path
 from dembark.common.choices import Value
 from dembark.common.errors import DembarkError
 
-from .base import DECK_NOTE, DeckNumber, Engine, EngineFacts, texts
+from .base import DECK_NOTE, DeckNumber, Engine, EngineFacts, RigidBody, texts
 
 # Features of YADE's build, and what needs them.
 _FEATURES = {"VTK": "VTKRecorder", "QT5": "yade.qt, SnapshotEngine", "GTS": "pack.gtsSurface2Facets", "CGAL": "TesselationWrapper",
              "PFVFLOW": "FlowEngine"}
 
 
+_BODY = '''"""{about}
+
+    sys.path.append(folder of this file)
+    number, members = {{this module}}.add()
+"""
+
+from yade import Body, Matrix3, O, Quaternion, Vector3, utils
+
+MASS = {mass!r}  # kg
+CENTRE = Vector3{centre!r}  # m, where the file has the centre of mass
+INERTIA = Matrix3(*(number for row in {inertia!r} for number in row))  # kg m^2, about it
+
+# x, y, z from the centre of mass, radius (m)
+SPHERES = (
+{rows})
+
+
+def add(position=CENTRE, orientation=Quaternion.Identity, material=-1):
+    """A clump with its centre of mass at `position`, turned by `orientation`; its number, and those of its spheres."""
+    spheres = [utils.sphere(position + orientation * Vector3(x, y, z), r, material=material) for x, y, z, r in SPHERES]
+    volume = sum(r**3 for _, _, _, r in SPHERES)
+    # YADE sums up the inertia of members: that of one without a volume, while spheres have no density. It is taken out at once.
+    axes, moments = INERTIA.spectralDecomposition()
+    core = utils.box(position, (1e-9, 1e-9, 1e-9), material=material)
+    core.state.mass, core.state.inertia = MASS, moments
+    core.state.ori = orientation * Quaternion(axes if axes.determinant() > 0 else -axes)
+    shared, density = spheres[0].mat, spheres[0].mat.density
+    shared.density = 0
+    number, members = O.bodies.appendClumped([core, *spheres])
+    shared.density = density
+    O.bodies.erase(members[0])
+    for sphere, (_, _, _, r) in zip(spheres, SPHERES):
+        sphere.state.mass = MASS * r**3 / volume
+        sphere.state.inertia = Vector3(1, 1, 1) * (0.4 * sphere.state.mass * r**2)
+    return number, members[1:]
+'''
+
+
 class Yade(Engine):
     """YADE's Python script with words `key=value`; one process, threads."""
 
     facts = EngineFacts.read("yade")
+
+    @classmethod
+    def body_files(cls, body: RigidBody) -> dict[str, str]:
+        """See Engine: a module whose function `add` makes the clump."""
+        rows = "".join(f"    {sphere!r},\n" for sphere in body.spheres)
+        text = _BODY.format(about=body.about(), mass=body.mass, centre=body.centre, inertia=body.inertia, rows=rows)
+        return {f"{body.name}_body.py": text}
 
     @property
     def prefix(self) -> Path:
