@@ -98,7 +98,8 @@ def test_commands_and_options_exist() -> None:
 
 
 def test_table_of_options() -> None:
-    for page, first, *more in (("fields", "fields", "walls"), ("debarking", "debark"), ("pictures", "render"), ("tracks", "tracks")):
+    for page, first, *more in (("fields", "fields", "walls"), ("debarking", "debark"), ("pictures", "render"), ("tracks", "tracks"),
+                               ("clumps", "body")):
         named = {option for cell in rows(TEXTS[f"docs/how-to/{page}.md"], "option") for option in re.findall(r"`(--[a-z-]+)`", cell)}
         assert named <= subcommands()[first].union(*(subcommands()[name] for name in more))
         assert {option for option in subcommands()[first] if option.startswith("--")} - named == {"--help"}

@@ -22,7 +22,7 @@ class Liggghts(InputScript):
 variable {name}_atom_type index 1
 variable {name}_number    index 1
 fix {name} all particletemplate/multisphere 15485863 atom_type ${{{name}_atom_type}} density constant {body.density!r} &
-    nspheres {len(body.spheres)} ntry 100000 spheres file {name}.spheres scale 1.0 &
+    volume_limit {1e-3 * body.mass / body.density!r} nspheres {len(body.spheres)} ntry 100000 spheres file {name}.spheres scale 1.0 &
     mass {body.mass!r} inertia_tensor {row((xx, xy, xz, yy, yz, zz))} use_density type ${{{name}_number}}
 """
         files = {f"{name}.spheres": "".join(f"{row(sphere)}\n" for sphere in body.spheres), f"{name}-liggghts.in": template}

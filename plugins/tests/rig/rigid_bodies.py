@@ -27,17 +27,19 @@ NAME = "one"
 
 @dataclass(frozen=True)
 class Flight:
-    """A body at the origin of the file's coordinates, raised by `height` (m), with its velocity (m/s) and spin (rad/s). `grain`: places
-    (m) and velocities (m/s) of single grains of `grain_radius` (m) and `grain_mass` (kg)."""
+    """A body with its centre of mass `height` (m) above the origin, its velocity (m/s) and spin (rad/s). `grains`: places (m) and
+    velocities (m/s) of single grains of `grain_radius` (m) and `grain_mass` (kg)."""
 
     triangles: Array
-    spacing: float
+    spacing: float = 0.01  # m, of a lattice; not used with `spheres`
+    spheres: int = 0       # so many of different sizes
     density: float = 2500.0
     height: float = 0.0
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     floor: bool = False
-    grain: tuple[float, float, float, float, float, float] | None = None
+    gravity: float = 0.0
+    grains: tuple[tuple[float, float, float, float, float, float], ...] = ()
     grain_radius: float = 0.005
     grain_mass: float = 0.01
     time_step: float = 1e-5
@@ -49,20 +51,21 @@ class Flight:
 
 @dataclass(frozen=True)
 class Motion:
-    """Of the body by frames: place (m), velocity (m/s), turn from the start, spin (rad/s); and the velocity of the grain."""
+    """Of the body by frames: place (m), velocity (m/s), turn from the start, spin (rad/s); and the velocities of the grains (f, g, 3)."""
 
     place: Array
     velocity: Array
     turn: Rotation
     spin: Array
-    grain_velocity: Array
+    grain_velocities: Array
 
 
 def written(folder: Path, flight: Flight, engine: str) -> bodies.Mesh:
     """Writes the body's files into `folder`; the surface."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "one.stl").write_text(stl([tuple(map(tuple, corners)) for corners in flight.triangles.tolist()]))
-    words = ["body", str(folder / "one.stl"), "--engine", engine, "--density", repr(flight.density), "--spacing", repr(flight.spacing)]
+    words = ["body", str(folder / "one.stl"), "--engine", engine, "--density", repr(flight.density),
+             *(["--spheres", str(flight.spheres)] if flight.spheres else ["--spacing", repr(flight.spacing)])]
     assert cli.main([*words, "--at", f"0,0,{flight.height!r}", "--out", str(folder)]) == 0
     return bodies.read_body(folder / "one.stl")
 
@@ -72,8 +75,12 @@ def fly(engine: str, folder: Path, flight: Flight) -> Motion:
     mesh = written(folder, flight, engine)
     {"liggghts": _liggghts, "lammps": _lammps, "yade": _yade}[engine](folder, flight)
     steps, frames = read_dump(folder / "grains.dump")
-    rest = bodies.voxels(mesh, flight.spacing).centres - mesh.mass.centre
+    filled = bodies.covering(mesh, flight.spheres) if flight.spheres else bodies.voxels(mesh, flight.spacing)
+    rest = filled.centres - mesh.mass.centre
     table = np.array([frame for step, frame in zip(steps, frames, strict=True) if step > 0])[:, :, 1:]
+    if engine == "liggghts":
+        # There grains are made first: `set` does not go with bodies.
+        table = np.roll(table, -len(flight.grains), axis=1)
     own, other = table[:, :len(rest)], table[:, len(rest):]
     turns, places, velocities, spins = [], [], [], []
     for frame in own:
@@ -93,18 +100,19 @@ def fly(engine: str, folder: Path, flight: Flight) -> Motion:
         velocities.append(found[:3])
         spins.append(found[3:])
     return Motion(np.array(places), np.array(velocities), Rotation.from_quat(turns), np.array(spins),
-                 other[:, 0, 3:6] if other.shape[1] else np.empty((0, 3)))
+                  other[:, :, 3:6])
 
 
-def _grain_lines(flight: Flight) -> str:
-    if flight.grain is None:
-        return ""
-    x, y, z, vx, vy, vz = flight.grain
+def _grain_lines(flight: Flight, first: int) -> str:
     density = flight.grain_mass / (4.0 / 3.0 * np.pi * flight.grain_radius**3)
-    return (f"create_atoms 2 single {x!r} {y!r} {z!r} units box\n"
-            f"group single type 2\nset group single diameter {2.0 * flight.grain_radius!r} density {float(density)!r}\n"
-            f"set group single vx {vx!r} vy {vy!r} vz {vz!r}\n"
-            "fix motion single nve/sphere\n")
+    lines = [f"create_atoms 2 single {x!r} {y!r} {z!r} units box" for x, y, z, *_ in flight.grains]
+    for number, (*_, vx, vy, vz) in enumerate(flight.grains, first):
+        lines.append(f"set atom {number} diameter {2.0 * flight.grain_radius!r} density {float(density)!r} vx {vx!r} vy {vy!r} vz {vz!r}")
+    return "\n".join([*lines, *(["group single type 2", "fix motion single nve/sphere"] if flight.grains else [])]) + "\n"
+
+
+def _weight(flight: Flight) -> str:
+    return f"fix weight all gravity {flight.gravity!r} vector 0 0 -1\n" if flight.gravity else ""
 
 
 _DOMAIN = """\
@@ -127,13 +135,13 @@ pair_style gran {liggghts_driver.models(m)}
 pair_coeff * *
 include one-liggghts.in
 fix distribution all particledistribution/discrete 86028157 1 one 1.0
-{floor}region place block {place} units box
+{floor}{_grain_lines(flight, 1)}{_weight(flight)}region place block {place} units box volume_limit 1e-20
 fix insert all insert/pack seed 32452867 distributiontemplate distribution insert_every once overlapcheck no &
     orientation constant 1 0 0 0 vel constant {numbers} omega constant {" ".join(map(repr, flight.spin))} &
     particles_in_region 1 region place
 fix body all multisphere
 run 1
-{_grain_lines(flight)}dump grains all custom {flight.steps // flight.frames} grains.dump id x y z vx vy vz
+dump grains all custom {flight.steps // flight.frames} grains.dump id x y z vx vy vz
 dump_modify grains sort id format "%d %.17g %.17g %.17g %.17g %.17g %.17g"
 run {flight.steps}
 """)
@@ -144,6 +152,7 @@ def _lammps(folder: Path, flight: Flight) -> None:
     m = flight.material
     floor = "region floor plane 0 0 0 0 0 1 units box\nfix floor all wall/dembark region floor type 2\n" if flight.floor else ""
     # Angular momentum and velocity are in the file.
+    members = int((folder / "one.mol").read_text().partition(" atoms")[0].split()[-1])
     infile = (folder / "one.infile").read_text().splitlines()
     words = infile[2].split()
     moments = np.array(words[5:11], float)
@@ -162,8 +171,8 @@ pair_coeff * * {lammps_driver.coefficients(m)}
 molecule one one.mol
 create_atoms 0 single 0 0 {flight.height!r} mol one 1 rotate 0 0 0 1 units box
 group members type 1
-{_grain_lines(flight)}neigh_modify exclude molecule/intra members
-{floor}fix body members rigid/small molecule infile one.infile
+{_grain_lines(flight, members + 1)}neigh_modify exclude molecule/intra members
+{floor}{_weight(flight)}fix body members rigid/small molecule infile one.infile {"gravity weight" if flight.gravity else ""}
 dump grains all custom {flight.steps // flight.frames} grains.dump id x y z vx vy vz
 dump_modify grains sort id format float %.17g
 thermo_style custom step
@@ -174,9 +183,15 @@ run {flight.steps}
 
 def _yade(folder: Path, flight: Flight) -> None:
     m = flight.material
-    names = ("velocity", "spin", "floor", "grain", "grain_radius", "grain_mass", "time_step", "steps", "frames", "own_loop")
+    names = ("velocity", "spin", "floor", "gravity", "grains", "grain_radius", "grain_mass", "time_step", "steps", "frames", "own_loop")
     given = {name: getattr(flight, name) for name in names}
-    given["material"] = {"young": m.youngs_modulus, "poisson": m.poisson_ratio, "restitution": m.restitution, "friction": m.static_friction}
+    given |= {"young": m.youngs_modulus, "poisson": m.poisson_ratio, "pair": {
+        "restitution": m.restitution, "staticFriction": m.static_friction, "kineticFriction": m.kinetic_friction,
+        "criticalSlipDistance": m.critical_slip_distance, "rollingFriction": m.rolling_friction}}
+    given["law"] = {"rollingResistance": m.rolling_resistance}
+    if m.bridge_volume > 0.0:
+        given["pair"] |= {"bridgeVolume": m.bridge_volume, "contactAngle": m.contact_angle, "surfaceTension": m.surface_tension}
+        given["law"]["capillaryModel"] = m.capillary_model
     (folder / "flight.json").write_text(json.dumps(given))
     done = yade_driver.run_script(folder, SCRIPT)
     assert "rig: finished" in done.stdout, (done.stdout + done.stderr)[-3000:]

@@ -11,8 +11,7 @@ import one_body
 
 with open("flight.json", encoding="utf-8") as stored:
     flight = json.load(stored)
-law = flight["material"]
-O.materials.append(FrictMat(young=law["young"], poisson=law["poisson"], density=2500, frictionAngle=0.0))
+O.materials.append(FrictMat(young=flight["young"], poisson=flight["poisson"], density=2500, frictionAngle=0.0))
 number, members = one_body.add()
 state = O.bodies[number].state
 state.vel, state.angVel = flight["velocity"], flight["spin"]
@@ -20,20 +19,20 @@ state.vel, state.angVel = flight["velocity"], flight["spin"]
 own = state.ori.conjugate() * state.angVel
 state.angMom = state.ori * Vector3(*(state.inertia[k] * own[k] for k in range(3)))
 shown = list(members)
-if flight["grain"]:
-    grain = utils.sphere(flight["grain"][:3], flight["grain_radius"])
+for row in flight["grains"]:
+    grain = utils.sphere(row[:3], flight["grain_radius"])
     grain.state.mass = flight["grain_mass"]
     grain.state.inertia = Vector3(1, 1, 1) * (0.4 * flight["grain_mass"] * flight["grain_radius"]**2)
-    grain.state.vel = flight["grain"][3:]
+    grain.state.vel = row[3:]
     shown.append(O.bodies.append(grain))
 if flight["floor"]:
     O.bodies.append(utils.wall(0, 2, sense=1))
-pair = Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(restitution=law["restitution"], staticFriction=law["friction"],
-                                                  kineticFriction=law["friction"], criticalSlipDistance=0)
+loop = SphereContactLoop if flight["own_loop"] else InteractionLoop
 O.engines = [ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()], verletDist=1e-3),
-             (SphereContactLoop if flight["own_loop"] else InteractionLoop)(
-                 [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()], [pair], [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz()]),
-             NewtonIntegrator(damping=0, exactAsphericalRot=True)]
+             loop([Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom()],
+                  [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**flight["pair"])],
+                  [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(**flight["law"])]),
+             NewtonIntegrator(damping=0, exactAsphericalRot=True, gravity=(0, 0, -flight["gravity"]))]
 O.dt = flight["time_step"]
 with open("grains.dump", "w", encoding="utf-8") as out:
     for _ in range(flight["frames"]):
