@@ -182,8 +182,9 @@ def _masses(table: _Table, radii: Array, density: float | None, say: Say) -> Arr
         masses, solid = table("mass"), table("density") * volume(radii)
         table.taken.discard("density")
         if len(wrong := np.flatnonzero(np.abs(masses - solid) > 0.01 * masses)):
-            raise DumpError(f"{table.where}: grain {table.ids[wrong[0]]} has a mass of {masses[wrong[0]]:.6g} kg, but {solid[wrong[0]]:.6g} kg "
-                            "by its density; dump only the right one (spheres of LIGGGHTS's multispheres have the mass of their body)")
+            first = wrong[0]
+            raise DumpError(f"{table.where}: grain {table.ids[first]} has a mass of {masses[first]:.6g} kg, but {solid[first]:.6g} kg by its "
+                            "density; dump only the right one (spheres of LIGGGHTS's multispheres have the mass of their body)")
     if held:
         return table("mass") if held[0] == "mass" else table("density") * volume(radii)
     if density is None:

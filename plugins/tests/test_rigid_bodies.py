@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig.rigid_bodies import Flight, fly
+from rig.liggghts_driver import head, run_deck
+from rig.rigid_bodies import Flight, fly, written
 from rig.scenarios import Material
 
 ENGINES = ("liggghts", "yade", "lammps")
@@ -126,3 +127,37 @@ def test_a_body_falls_without_turning(engine, tmp_path):
     print(engine, found.velocity[-1], np.abs(found.spin).max())
     np.testing.assert_allclose(found.velocity[-1], [0, 0, -0.981], atol=2e-4)
     assert np.abs(found.spin).max() < 1e-6
+
+
+def test_fix_sph_body_takes_the_particles_of_a_lattice(liggghts_is_there, tmp_path):
+    """It falls in air, and its spin, about a principal axis, stays."""
+    written(tmp_path, Flight(BRICK, height=0.1, density=1500.0), "liggghts")
+    done = run_deck(tmp_path, f"""\
+{head().replace("granular", "hybrid granular sph")}
+region domain block -0.1 0.1 -0.1 0.1 -0.1 0.2 units box
+create_box 2 domain
+variable one_atom_type index 2
+include one-sph.in
+create_atoms 1 single 0.08 0.08 0.1 units box
+mass * 0.001
+set group all diameter 0.01 density 1000
+set group all mass 0.001
+set group all meso_rho 1000
+group water type 1
+neighbor 0.005 bin
+neigh_modify exclude type 2 2
+pair_style sph/coupled spacing 0.01 sound_speed 10 density 1000
+pair_coeff * *
+timestep 1e-4
+fix weight all gravity 9.81 vector 0 0 -1
+fix fluid water nve/sph/coupled
+fix one one ${{one_sph}} spin 0 0 2
+variable all equal f_one[6]
+variable spin equal f_one[9]
+variable count equal count(one)
+run 100
+print "found: ${{all}} ${{spin}} ${{count}}"
+""")
+    assert done.code == 0 and not done.error, done.error or done.output[-2000:]
+    velocity, spin, count = map(float, done.output.rpartition("found: ")[2].split()[:3])
+    assert count == 24 and spin == pytest.approx(2.0, rel=1e-9) and velocity == pytest.approx(-0.0981, rel=1e-9)
