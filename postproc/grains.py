@@ -183,8 +183,8 @@ def _masses(table: _Table, radii: Array, density: float | None, say: Say) -> Arr
         table.taken.discard("density")
         if len(wrong := np.flatnonzero(np.abs(masses - solid) > 0.01 * masses)):
             first = wrong[0]
-            raise DumpError(f"{table.where}: grain {table.ids[first]} has a mass of {masses[first]:.6g} kg, but {solid[first]:.6g} kg by its "
-                            "density; dump only the right one (spheres of LIGGGHTS's multispheres have the mass of their body)")
+            raise DumpError(f"{table.where}: grain {table.ids[first]} has a mass of {masses[first]:.6g} kg, and {solid[first]:.6g} kg by "
+                            "its density; dump only the right one (spheres of LIGGGHTS's multispheres have the mass of their body)")
     if held:
         return table("mass") if held[0] == "mass" else table("density") * volume(radii)
     if density is None:

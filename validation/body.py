@@ -54,10 +54,11 @@ def body(
     if len(filled.radii) < 2:
         raise DembarkError("there is one sphere in the body", "", "take more, or a sphere of the engine")
     centre, inertia = mesh.mass.centre, density * mesh.mass.inertia
+    x, y, z = centre.tolist()
     rows = np.column_stack([filled.centres - centre, filled.radii]).tolist()
     made = engines.RigidBody(
-        called, density * mesh.mass.volume, tuple((a, b, c) for a, b, c in inertia.tolist()), at or (centre[0], centre[1], centre[2]),
-        tuple((x, y, z, r) for x, y, z, r in rows), bodies.is_principal(inertia), spheres is None)
+        called, density * mesh.mass.volume, tuple((a, b, c) for a, b, c in inertia.tolist()), at or (x, y, z),
+        tuple((a, b, c, r) for a, b, c, r in rows), bodies.is_principal(inertia), spheres is None)
     try:
         out.mkdir(parents=True, exist_ok=True)
         files = [write_atomic(out / file, text.encode()) for file, text in engines.engine_class(engine).body_files(made).items()]

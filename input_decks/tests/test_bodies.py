@@ -202,7 +202,7 @@ def test_the_command_writes_what_each_engine_takes(tmp_path, capsys):
         said = capsys.readouterr().out
         files[name] = {line.removeprefix("written: ") for line in said.splitlines() if line.startswith("written")}
     assert "44 triangles, closed; volume 5e-06 m3" in said and "mass 0.0125 kg" in said
-    assert {name: len(found) for name, found in files.items()} == {"liggghts": 2, "yade": 1, "lammps": 2}
+    assert {name: len(found) for name, found in files.items()} == {"liggghts": 2, "yade": 1, "lammps": 3}
     rows = np.loadtxt(out / "my_part.spheres")
     assert rows.shape == (6, 4)
     template = (out / "my_part-liggghts.in").read_text()
@@ -215,6 +215,11 @@ def test_the_command_writes_what_each_engine_takes(tmp_path, capsys):
     # The spheres' own masses add up to the body's.
     masses = (out / "my_part.mol").read_text().split("Masses\n\n")[1].split("\n\n")[0]
     assert sum(float(line.split()[1]) for line in masses.splitlines()) == pytest.approx(0.0125)
+    # Without --at the centre of mass is where the file has it; numbers are plain.
+    for name in engines.names():
+        assert cli.main([*common, "--engine", name, "--spheres", "6"]) == 0
+    assert "CENTRE = Vector3(0.01, 0.007, 0.007" in (out / "my_part_body.py").read_text().replace("0.010000000000000002", "0.01")
+    assert not any("np." in one.read_text() for one in out.iterdir())
     # Particles of fix sph/body need principal axes and a lattice.
     assert cli.main([*common, "--engine", "liggghts", "--spacing", "5 mm", "--principal"]) == 0
     assert "inertia" in (out / "my_part-sph.in").read_text()

@@ -22,7 +22,7 @@ class Lammps(InputScript):
 
     @classmethod
     def body_files(cls, body: RigidBody) -> dict[str, str]:
-        """See Engine: a molecule, and the file `infile` of `fix rigid/small` for one at the body's centre."""
+        """See Engine: a molecule, commands that make one at the body's centre, and the file `infile` of its `fix rigid/small`."""
         sections = {"Coords": (sphere[:3] for sphere in body.spheres), "Diameters": ([2.0 * sphere[3]] for sphere in body.spheres),
                     "Masses": ([body.density * 4.0 / 3.0 * math.pi * sphere[3] ** 3] for sphere in body.spheres)}
         lines = [f"# {body.about()}", "", f"{len(body.spheres)} atoms", f"{body.mass!r} mass", "0 0 0 com", f"{row(body.moments)} inertia"]
@@ -31,7 +31,18 @@ class Lammps(InputScript):
         lines += ["", "Types", "", *(f"{number} 1" for number in range(1, len(body.spheres) + 1))]
         # The number of the molecule, that of the first which create_atoms makes; no velocity, no angular momentum, no image flags.
         made = f"1 {body.mass!r} {row(body.centre)} {row(body.moments)} 0 0 0 0 0 0 0 0 0"
-        return {f"{body.name}.mol": "\n".join(lines) + "\n", f"{body.name}.infile": f"# {body.about()}\n1\n{made}\n"}
+        # Of a molecule, create_atoms puts the mean of the atoms there.
+        place = row(x + sum(sphere[axis] for sphere in body.spheres) / len(body.spheres) for axis, x in enumerate(body.centre))
+        name = body.name
+        commands = f"""\
+# {body.about()}
+# One of them; fix ID GROUP rigid/small molecule infile {name}.infile moves it. The variable, if it is set before, is added to its type, 1.
+variable {name}_type_offset index 0
+molecule {name} {name}.mol
+create_atoms ${{{name}_type_offset}} single {place} mol {name} 1 rotate 0 0 0 1 units box
+"""
+        return {f"{name}.mol": "\n".join(lines) + "\n", f"{name}.infile": f"# {body.about()}\n1\n{made}\n",
+                f"{name}-lammps.in": commands}
 
     @classmethod
     def locate(cls) -> Path:

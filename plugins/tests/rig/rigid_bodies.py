@@ -111,8 +111,8 @@ def _grain_lines(flight: Flight, first: int) -> str:
     return "\n".join([*lines, *(["group single type 2", "fix motion single nve/sphere"] if flight.grains else [])]) + "\n"
 
 
-def _weight(flight: Flight) -> str:
-    return f"fix weight all gravity {flight.gravity!r} vector 0 0 -1\n" if flight.gravity else ""
+def _weight(flight: Flight, group: str = "all") -> str:
+    return f"fix weight {group} gravity {flight.gravity!r} vector 0 0 -1\n" if flight.gravity else ""
 
 
 _DOMAIN = """\
@@ -168,11 +168,11 @@ comm_modify cutoff 0.06
 {_DOMAIN}timestep {flight.time_step!r}
 pair_style dembark/granular {lammps_driver.settings(m)}
 pair_coeff * * {lammps_driver.coefficients(m)}
-molecule one one.mol
-create_atoms 0 single 0 0 {flight.height!r} mol one 1 rotate 0 0 0 1 units box
+include one-lammps.in
 group members type 1
 {_grain_lines(flight, members + 1)}neigh_modify exclude molecule/intra members
-{floor}{_weight(flight)}fix body members rigid/small molecule infile one.infile {"gravity weight" if flight.gravity else ""}
+group others subtract all members
+{floor}{_weight(flight, "others")}fix body members rigid/small molecule infile one.infile {"gravity weight" if flight.gravity else ""}
 dump grains all custom {flight.steps // flight.frames} grains.dump id x y z vx vy vz
 dump_modify grains sort id format float %.17g
 thermo_style custom step
