@@ -232,7 +232,7 @@ def covering(mesh: Mesh, number: int) -> Spheres:
     """At most `number` spheres of different sizes that touch the surface from inside and may overlap.
 
     The body-covering scheme of Li, Xu and Meng (2015): at each point of a lattice in the body the largest sphere within it; of these, one
-    after the other, that which covers most points that no sphere covers yet. It ends early when all are covered. The lattice has 20 000
+    after the other, the one that covers most points not yet covered. It ends early when all are covered. The lattice has 20 000
     points, one of them in the middle of the body's extent; spheres are at least as large as its cells.
     """
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)

@@ -20,8 +20,8 @@ def cells(*places, edge=1.0):
     for place in places:
         for axis in range(3):
             for side in (0, 1):
-                beside = tuple(x + (2 * side - 1) * (k == axis) for k, x in enumerate(place))
-                if beside in places:
+                neighbour = tuple(x + (2 * side - 1) * (k == axis) for k, x in enumerate(place))
+                if neighbour in places:
                     continue
                 corners = []
                 for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))[:: 2 * side - 1]:
