@@ -93,7 +93,6 @@ def test_a_grain_hits_the_end_of_a_rod(engine, tmp_path, e, friction):
     push = np.array([friction * impulse, 0, impulse])
     share = 1e-2 if friction else 2e-3
     spin = -(arm * push[2] + radius * push[0]) / MOMENT
-    print(engine, e, friction, found.velocity[-1], push / MASS, found.spin[-1], spin, found.grain_velocities[-1, 0])
     np.testing.assert_allclose(found.velocity[-1], push / MASS, rtol=0, atol=share * impulse / MASS)
     np.testing.assert_allclose(found.spin[-1], [0, spin, 0], rtol=0, atol=share * abs(spin))
     np.testing.assert_allclose(found.grain_velocities[-1, 0], [along, 0, 1] - push / m, rtol=0, atol=share)
@@ -116,7 +115,6 @@ def test_momentum_is_conserved_in_a_cloud_of_grains_with_a_body(engine, tmp_path
     mass = 2500 * 4e-6
     momentum = mass * found.velocity + 0.002 * found.grain_velocities.sum(axis=1)
     begin = mass * np.array([0.1, 0, 0]) + 0.002 * np.array(CLOUD)[:, 3:].sum(axis=0)
-    print(engine, law, found.velocity[-1], found.spin[-1], np.abs(momentum - begin).max())
     assert np.abs(found.velocity[-1] - [0.1, 0, 0]).max() > 0.01 and np.abs(found.spin[-1]).max() > 0.5
     np.testing.assert_allclose(momentum, np.tile(begin, (len(momentum), 1)), atol=1e-9)
 
@@ -124,7 +122,6 @@ def test_momentum_is_conserved_in_a_cloud_of_grains_with_a_body(engine, tmp_path
 def test_a_body_falls_without_turning(engine, tmp_path):
     """The weight acts at its centre of mass, which is not that of its spheres."""
     found = fly(engine, tmp_path, Flight(WEDGE, spheres=12, height=0.15, gravity=9.81, time_step=1e-5, steps=10000, frames=10))
-    print(engine, found.velocity[-1], np.abs(found.spin).max())
     np.testing.assert_allclose(found.velocity[-1], [0, 0, -0.981], atol=2e-4)
     assert np.abs(found.spin).max() < 1e-6
 
