@@ -35,6 +35,7 @@ SPHERES = (
 
 def add(position=CENTRE, orientation=Quaternion.Identity, material=-1):
     """A clump with its centre of mass at `position`, turned by `orientation`; its number, and those of its spheres."""
+    position = Vector3(*position)
     spheres = [utils.sphere(position + orientation * Vector3(x, y, z), r, material=material) for x, y, z, r in SPHERES]
     volume = sum(r**3 for _, _, _, r in SPHERES)
     # YADE sums up the inertia of members: that of one without a volume, while spheres have no density. It is taken out at once.

@@ -12,7 +12,7 @@ import one_body
 with open("flight.json", encoding="utf-8") as stored:
     flight = json.load(stored)
 O.materials.append(FrictMat(young=flight["young"], poisson=flight["poisson"], density=2500, frictionAngle=0.0))
-number, members = one_body.add()
+number, members = one_body.add(tuple(one_body.CENTRE))
 state = O.bodies[number].state
 state.vel, state.angVel = flight["velocity"], flight["spin"]
 # Bodies whose moments differ are moved by their angular momentum.
