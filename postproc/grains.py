@@ -178,13 +178,6 @@ def _masses(table: _Table, radii: Array, density: float | None, say: Say) -> Arr
     held = [name for name in ("mass", "density") if table.has([name])]
     if held and density is not None:
         say(f"the given density is not used, for the dump has a column {held[0]}")
-    if len(held) == 2 and not any(name.startswith(_SHAPE) for name in table.raw.columns):
-        masses, solid = table("mass"), table("density") * volume(radii)
-        table.taken.discard("density")
-        if len(wrong := np.flatnonzero(np.abs(masses - solid) > 0.01 * masses)):
-            first = wrong[0]
-            raise DumpError(f"{table.where}: grain {table.ids[first]} has a mass of {masses[first]:.6g} kg, and {solid[first]:.6g} kg by "
-                            "its density; dump only the right one (spheres of LIGGGHTS's multispheres have the mass of their body)")
     if held:
         return table("mass") if held[0] == "mass" else table("density") * volume(radii)
     if density is None:

@@ -270,7 +270,6 @@ def plain(columns, rows):
     ("id x y z radius mass", [f"1.2345{n}e+06 0 0 0 1 1" for n in range(3)], "rounded to six digits"),
     ("id x y z radius mass", ["1 0 0 0 -1 1"], "grain 1 has a radius of -1"),
     ("id x y z diameter mass", ["1 0 0 0 1 1", "2 0 0 0 1 -3"], "grain 2 has a mass of -3"),
-    ("id x y z radius mass density", ["1 0 0 0 1 8.37758 2", "2 0 0 0 1 25.13 2"], "grain 2 has a mass of 25.13 kg, and 8.37758 kg by its"),
 ])
 def test_numbers_that_make_no_sense_are_refused(tmp_path, columns, rows, message):
     (tmp_path / "a.dump").write_text(plain(columns, rows))
