@@ -168,9 +168,9 @@ class Engine(ABC):
         """The deck that runs, from its `source` in a case folder: with all numbers, and what it includes from `folders` in its place."""
 
     @classmethod
-    @abstractmethod
     def body_files(cls, body: RigidBody) -> dict[str, str]:
-        """Files, by name, from which its decks take the body."""
+        """Files, by name, from which its decks take the body; DembarkError for an engine that takes none."""
+        raise DembarkError(f"{cls.facts.title} takes no bodies of spheres", f"such as {body.name}")
 
     @classmethod
     def locate(cls) -> Path:
