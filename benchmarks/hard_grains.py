@@ -70,6 +70,8 @@ def compared(folder: Path, packings: int, law: Mapping[str, Any]) -> Iterator[st
     for path in sorted(folder.glob("drive_power/*/*/metrics.json")):
         found = json.loads(path.read_text())
         p, soft = found["parameters"], {one["name"]: one for one in found["quantities"]}
+        if (p["cell_width"], p["cell_depth"]) != (SIDE, SIDE):
+            raise SystemExit(f"{path}: the cell is {p['cell_width']} m wide and {p['cell_depth']} m deep, not {SIDE} m")
         hard = np.array([shaken(p["motion_gamma"], seed, count=p["grain_count"], restitution=p["restitution"], **law)
                          for seed in range(packings)])
         ratios = [f"{soft[name]['value'] / values.mean():.3f} ± {half_width(soft[name], values):.3f}"

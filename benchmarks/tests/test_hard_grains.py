@@ -33,7 +33,8 @@ def test_the_map_compares_with_the_results_of_a_campaign(tmp_path, capsys):
     height, power = np.mean([hard_grains.shaken(16.0, seed, count=16) for seed in range(4)], axis=0)
     quantities = [{"name": name, "value": value, "interval": [0.99 * value, 1.01 * value]}
                   for name, value in (("height", 1.1 * height), ("force_power", 0.9 * power))]
-    parameters = {"motion_gamma": 16.0, "grain_count": 16, "restitution": 0.9, "youngs_modulus": 4e7}
+    parameters = {"motion_gamma": 16.0, "grain_count": 16, "restitution": 0.9, "youngs_modulus": 4e7,
+                  "cell_width": 0.02, "cell_depth": 0.02}
     folder = tmp_path / "drive_power" / "gas" / "lammps"
     folder.mkdir(parents=True)
     (folder / "metrics.json").write_text(json.dumps({"parameters": parameters, "quantities": quantities}))
