@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <string>
 
 #include "compute.h"
 #include "memory.h"
@@ -128,7 +129,12 @@ void ImpactFix::do_step(double dt, const std::function<void()>& work) {
 }
 
 void ImpactFix::setup(int) {
-  do_step(0.0, [this] { impacts_->set_up(update->ntimestep); });
+  std::string doubtful;
+  do_step(0.0, [&] {
+    impacts_->set_up(update->ntimestep);
+    doubtful = impacts_->step_warning();
+  });
+  if (!doubtful.empty()) warn(doubtful);
   fill_local();
 }
 

@@ -113,11 +113,7 @@ void bind_impact(nb::module_& m) {
                                    numpy(h.spin, {samples, n, 3}), numpy(h.orientation, {samples, oriented, 4}),
                                    numpy(h.report, {samples, 14}), numpy(h.column, {samples, left.size()}), table(impacts, 17));
            })
-      .def("worst_overlap",
-           [](Scene& scene) {
-             const auto worst = scene.worst_overlap();
-             return nb::make_tuple(worst.first.first, worst.first.second, worst.second);
-           })
+      .def("start_error", &Scene::start_error)
       .def("contacts", [](const Scene& scene) { return table(scene.system().contacts(), 14); })
       .def("kinetic_energy_of_half_step", &Scene::kinetic_energy_of_half_step)
       .def("time", &Scene::time)

@@ -109,6 +109,36 @@ def test_another_time_step_goes_on(run, tmp_path):
     assert duration == pytest.approx(math.pi / math.sqrt(0.5 * 1e7 / 25.0), rel=5e-3)
 
 
+FLOOR = "stiffness 1e7 theta 0.5 wall plane floor y 0 lo stiffness 4e7"
+
+
+@pytest.mark.parametrize(("logs", "line"), [
+    ([Log((0.0, 0.5)), Log((0.198, 0.5))], "atom 1 and atom 2 overlap at the start by 0.02 of the radius; at most 0.01 is allowed"),
+    ([Log((0.0, 0.09)), Log((0.5, 0.5))], "atom 1 and wall floor overlap at the start by 0.1 of the radius; at most 0.01 is allowed")])
+def test_overlaps_at_the_start_are_refused(engine, tmp_path, logs, line):
+    for ranks in (1, 2):
+        done = impact_decks.start(tmp_path / str(ranks), Case(logs, FLOOR, 1e-5, "run 1"), engine=engine, ranks=ranks)
+        assert done.code != 0 and line in done.error
+
+
+def test_a_run_that_goes_on_may_overlap(run, tmp_path):
+    """A soft floor gives way by a tenth of the radius; the next run and one from a restart file begin with that."""
+    words = "stiffness 1e5 wall plane floor y 0 lo stiffness 1e5"
+    case = Case([Log((0.0, 0.1), (0.0, -1.0))], words, 1e-5, "run 1500\nwrite_restart deep.restart\nrun 10", every=1500)
+    through = run(tmp_path, case)
+    assert through.last[0, 2] < 0.095
+    after = run(tmp_path, case, head="read_restart deep.restart", run="run 10", dump="after.dump")
+    assert_same(after.last, through.last, 0.0)
+
+
+def test_a_step_that_resolves_no_impact_is_warned_of(run, tmp_path):
+    """The lightest log on the stiff floor has omega = sqrt(8e6 / 20): the limit of omega tau = 1 is 1.58 ms. One line for each step."""
+    logs = [Log((0.0, 0.5), mass=20.0), Log((0.5, 0.5), mass=60.0)]
+    long = run(tmp_path / "long", Case(logs, FLOOR, 1.6e-3, "run 1\nrun 1\ntimestep 1.5e-3\nrun 1\ntimestep 3e-3\nrun 1"))
+    lines = [line for line in long.output.splitlines() if "WARNING" in line and "impacts are resolved up to 1 / omega, 0.00158 s" in line]
+    assert ["is 1.01 / omega" in line for line in lines] == [True, False] and "is 1.9 / omega" in lines[1]
+
+
 def test_periodic_box(engine, run, tmp_path):
     """Two logs meet across the boundary; the same impact in the middle of the box is the same."""
     words = "stiffness 1e7 impacts impacts.txt"

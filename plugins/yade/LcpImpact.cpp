@@ -217,10 +217,21 @@ void LcpImpact::findContacts(double reach, std::vector<impact::Contact>& contact
 	}
 }
 
+/// Logs that overlap must not begin.
+void LcpImpact::checkStart() {
+	std::vector<impact::Contact> contacts;
+	findContacts(0.0, contacts);
+	const std::string wrong =
+		impact::start_error(logs, contacts, "log", [&](std::int64_t wall) { return wallName(std::size_t(wall)); });
+	if (!wrong.empty()) fail("LcpImpact: " + wrong);
+}
+
 /// Makes the model, anew where anything about it has changed, O.dt too; the state is carried over.
 void LcpImpact::prepare() {
 	const impact::Settings now = settings();
 	if (system && ::dembark::to_numbers(now) == ::dembark::to_numbers(system->settings())) return;
+	const std::string doubtful = impact::step_warning(now, logs, around);
+	if (!doubtful.empty()) dembark_yade::warn("LcpImpact: " + doubtful);
 	const bool                begins = !system;
 	const std::vector<double> state  = system ? system->state() : std::vector<double>();
 	system                           = std::make_unique<impact::System>(now);
@@ -238,6 +249,7 @@ void LcpImpact::action() {
 		gatherLogs(integrator().gravity);
 		gatherWalls();
 		prepare();
+		if (!system->begun()) checkStart();
 		const auto search = [&](double reach, std::vector<impact::Contact>& contacts) { findContacts(reach, contacts); };
 		auto       report = system->step(logs, search, around.wall_speed(), scene->time, first ? 0.5 : 1.0);
 		std::tie(contactCount, activeCount, impactsBegun, peakForce, impulseSum, dissipatedEnergy, elasticEnergy, pivots,

@@ -12,6 +12,7 @@
 #include "dembark/impact/impact_file.hpp"
 #include "dembark/impact/system.hpp"
 #include "dembark/impact/geometry.hpp"
+#include "dembark/impact/start.hpp"
 
 namespace yade {
 
@@ -110,6 +111,7 @@ private:
 	void                        findContacts(double reach, std::vector<::dembark::impact::Contact>&);
 	::dembark::impact::Settings commonSettings() const;
 	::dembark::impact::Settings settings() const;
+	void                        checkStart();
 	void                        prepare();
 	void                        moveBack() const;
 	void                        pushWalls();

@@ -20,7 +20,7 @@ def floor(folder, *, across=0.0, lift=0.0, squares=7):
     (folder / "floor.stl").write_text("solid floor\n" + "\n".join(facets) + "\nendsolid floor\n")
 
 
-ROLLING = [Log((-0.8, 0.1 + 2e-3), (2.0, -0.3)), Log((0.1, 0.0791), (-1.0, 0.0), radius=0.08, mass=30.0, z=0.03)]
+ROLLING = [Log((-0.8, 0.1 + 2e-3), (2.0, -0.3)), Log((0.1, 0.0793), (-1.0, 0.0), radius=0.08, mass=30.0, z=0.03)]
 WORDS = "stiffness 1e7 contact_damping 800 friction 0.3 impacts impacts.txt"
 
 

@@ -16,6 +16,7 @@
 #include "command.hpp"
 #include "impact_file.hpp"
 #include "last_forces.hpp"
+#include "start.hpp"
 #include "system.hpp"
 
 namespace dembark {
@@ -72,10 +73,18 @@ class Coupling {
   void step(std::int64_t now) { solve(now, 1.0); }
 
   /// Those of the set-up of a run, with velocities of the full step: half a kick follows. A run that goes on where one has ended knows the
-  /// forces of its step.
+  /// forces of its step. Throws std::invalid_argument with one line about bodies that must not begin as they are.
   void set_up(std::int64_t now) {
+    if (!system_.begun()) check_start();
     if (last_step_ != now || !last_.hold(bodies_, command.around.pairs.box)) solve(now, 0.5);
     else wrenches_ = last_.wrenches;
+  }
+
+  /// One line, once for each time step (s), where it resolves no impact; else nothing. After set_up().
+  std::string step_warning() {
+    if (judged_dt_ == last_dt_) return {};
+    judged_dt_ = last_dt_;
+    return impact::step_warning(system_.settings(), bodies_, command.around);
   }
 
   /// The forces, in the order in which the bodies were given.
@@ -115,6 +124,14 @@ class Coupling {
   }
 
  private:
+  void check_start() {
+    std::vector<Contact> contacts;
+    command.around.find(bodies_, 0.0, contacts);
+    const auto wall = [&](std::int64_t number) { return "wall " + command.walls[std::size_t(number)]; };
+    const std::string wrong = start_error(bodies_, contacts, "atom", wall);
+    if (!wrong.empty()) throw std::invalid_argument(wrong);
+  }
+
   void solve(std::int64_t now, double kick) {
     const double time = clock_time_ + double(now - clock_step_) * last_dt_;
     ContactGeometry& around = command.around;
@@ -158,7 +175,7 @@ class Coupling {
   LastForces last_;
   bool kept_ = false;  ///< last_ is that of the last step
   std::int64_t last_step_ = -1;
-  double last_dt_ = 0.0;
+  double last_dt_ = 0.0, judged_dt_ = 0.0;
   // Time of a step: an engine's own clock may not survive a restart with another time step.
   double clock_time_ = 0.0;
   std::int64_t clock_step_ = 0;

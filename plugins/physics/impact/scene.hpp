@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "geometry.hpp"
+#include "start.hpp"
 #include "system.hpp"
 
 namespace dembark {
@@ -51,20 +53,12 @@ class Scene {
   /// Of the moment; empty where the bodies have none.
   const std::vector<Quaternion>& orientation() const { return orientation_; }
 
-  /// Of the pairs of bodies, or of a body and a wall, that overlap now, that with the largest overlap over the smaller radius; its keys and
-  /// that ratio, 0 where nothing overlaps. Points, which have no radius, and what is held fast do not count.
-  std::pair<Key, double> worst_overlap() {
+  /// One line where bodies overlap now by more than a start may, else nothing.
+  std::string start_error() {
     std::vector<Contact> contacts;
     if (row) row_contacts(contacts);
     else find(0.0, contacts);
-    std::pair<Key, double> worst{};
-    for (const Contact& c : contacts) {
-      const Body &one = bodies_[std::size_t(c.a)], &other = c.b >= 0 ? bodies_[std::size_t(c.b)] : one;
-      const double radius = std::min(one.radius, other.radius);
-      if (radius == 0.0 || (std::isinf(one.mass) && std::isinf(other.mass))) continue;
-      if (-c.gap > worst.second * radius) worst = {{c.key_a, shown_id(c.key_b)}, -c.gap / radius};
-    }
-    return worst;
+    return impact::start_error(bodies_, contacts, "body", [](std::int64_t wall) { return "wall " + std::to_string(wall + 1); });
   }
 
   /// Contact forces of the moment. Asking twice changes nothing.

@@ -60,6 +60,8 @@ class System {
   System& operator=(const System&) = delete;
 
   const Settings& settings() const { return settings_; }
+  /// Whether there was a step, here or in the state that was restored.
+  bool begun() const { return history_.last().begun; }
 
   /// A new time step (s) from the next step on.
   void set_dt(double dt) {

@@ -29,9 +29,6 @@ _CAPSULE = np.dtype([*_BODY.descr, ("axial_inertia", float), ("length", float), 
 _REPORT = ("contacts", "active", "impacts_begun", "peak_force", "impulse_sum", "dissipated_energy", "elastic_energy", "pivots",
            "block_steps", "pivots_total", "certificate", "worst_certificate", "peak_force_so_far", "kinetic_energy")
 
-# Of two bodies at the start, over the smaller radius.
-MOST_OVERLAP = 0.01
-
 
 @dataclass(frozen=True)
 class Impact:
@@ -223,11 +220,9 @@ class _Scene:
 
     def check_start(self) -> None:
         """ValueError for bodies whose contact would throw them apart; loads at rest overlap by mg/k."""
-        a, b, part = self.build(1.0).worst_overlap()
-        if part > MOST_OVERLAP:
-            partner = f"wall {-b}" if b < 0 else f"body {b}"
-            raise ValueError(f"body {a} and {partner} overlap at the start by {part:.3g} of the radius; "
-                             f"at most {MOST_OVERLAP:g} is allowed")
+        wrong = self.build(1.0).start_error()
+        if wrong:
+            raise ValueError(wrong)
 
     def run(self, duration: float, dt: float, every: int, dimension: int, columns: Sequence[tuple[int, int]]) -> ImpactMotion:
         scene = self.at(dt)

@@ -159,8 +159,8 @@ def pile(count: int = 30, *, steps: int = 2000, **settings: Any) -> Case:
     logs = []
     for i in range(count):
         radius = 0.1 * (1.0 + 0.2 * math.sin(37.0 * i))
-        logs.append(Log((-0.72 + 0.25 * (i % 6) + 0.02 * math.sin(91.0 * i), 0.15 + 0.26 * (i // 6)),
-                        (0.5 * math.sin(53.0 * i), -1.0 + 0.5 * math.sin(17.0 * i)), radius=radius, mass=2500.0 * radius**2))
+        logs.append(Log((-0.72 + 0.25 * (i % 6) + 0.004 * math.sin(91.0 * i), 0.15 + 0.26 * (i // 6)),
+                        (math.sin(53.0 * i), -1.5 + math.sin(17.0 * i)), radius=radius, mass=2500.0 * radius**2))
     return Case(logs, f"stiffness 1e7 contact_damping 20000 friction 0.4 0.3 1e-4 impacts impacts.txt {GROUND}", 2e-5, f"run {steps}",
                 gravity=9.81, box=(-1.0, 1.0, -0.5, 2.5, -0.5, 0.5), **{"every": steps, **settings})
 

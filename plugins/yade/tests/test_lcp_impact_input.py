@@ -99,12 +99,37 @@ CASES = [
     ("O.bodies[1].aspherical = True\nstep()", ("log 1 is aspherical",)),
     ("O.bodies[1].state.pos = (0, 0.1, 0.01)\nstep()", ("log 1 meets log 2 out of the plane", "one z")),
     ("O.bodies.appendClumped([sphere((1, 1, 0), 0.1), sphere((1.1, 1, 0), 0.1)])\nstep()", ("belongs to a clump", "mask or ids")),
+    ("O.bodies[2].state.pos = (0.19, 0.1, 0)\nstep()",
+     ("LcpImpact: log 1 and log 2 overlap at the start by 0.1 of the radius; at most 0.01 is allowed",)),
+    ("O.bodies[2].state.pos = (0.5, 0.08, 0)\nstep()", ("log 2 and LcpImpact.walls[0] 'floor' overlap at the start by 0.2 of the radius",)),
     ("step(ids=[0])", ("LcpImpact.ids: body 0 is no Sphere",)),
     ("step(ids=[9])", ("LcpImpact.ids: body 9 does not exist",)),
     ("O.dt = 0\nstep()", ("time step",)),
     ("step(impactsFile='nowhere/impacts.txt')", ("nowhere/impacts.txt", "cannot be written")),
     ("LcpImpact(stiffness=1e7).wallForce('shell')", ("no wall has the name 'shell'",)),
 ]
+
+
+def test_a_scene_that_goes_on_may_overlap_and_long_steps_are_warned_of(yade):
+    """Two logs of 30 kg meet with omega = sqrt(1e7 / 30): the limit of omega tau = 1 is 1.73 ms."""
+    done = run(yade, """
+        scene()
+        impact = LcpImpact(stiffness=1e7, walls=[floor])
+        step(impact)
+        O.bodies[2].state.pos = (0.19, 0.1, 0)
+        step(impact)
+        O.saveTmp()
+        O.loadTmp()
+        O.step()
+        scene()
+        impact = LcpImpact(stiffness=1e7, walls=[floor])
+        for O.dt in (5e-3, 5e-3, 1e-3, 4e-3):
+            step(impact)
+        """)
+    assert "went on" in done.stdout, done.stderr
+    lines = [line for line in done.stderr.splitlines() if line.startswith("WARNING: dembark: LcpImpact: the time step of ")]
+    assert len(lines) == 2
+    assert all("impacts are resolved up to 1 / omega, 0.00173 s" in line for line in lines), lines
 
 
 @pytest.fixture(scope="module")
