@@ -12,7 +12,9 @@ from siconos import numerics
 
 METHODS = {"lemke": (numerics.SICONOS_LCP_LEMKE, numerics.lcp_lexicolemke),
            "newton_min": (numerics.SICONOS_LCP_NEWTONMIN, numerics.lcp_newton_min),
-           "pgs": (numerics.SICONOS_LCP_PGS, numerics.lcp_pgs)}
+           "pgs": (numerics.SICONOS_LCP_PGS, numerics.lcp_pgs),
+           "cpg": (numerics.SICONOS_LCP_CPG, numerics.lcp_cpg),
+           "latin": (numerics.SICONOS_LCP_LATIN, numerics.lcp_latin)}
 
 
 def main(path, wall, names):
@@ -25,7 +27,7 @@ def main(path, wall, names):
         number, solve = METHODS[name]
         problem = numerics.LCP(matrix, right)
         options = numerics.SolverOptions(number)
-        options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 100000
+        options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 20000
         options.dparam[numerics.SICONOS_DPARAM_TOL] = 1e-12
         z, w = np.zeros(len(right)), np.zeros(len(right))
         before = clock()
