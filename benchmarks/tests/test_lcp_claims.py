@@ -65,8 +65,8 @@ def test_files_hold_the_problems(tmp_path):
     assert len(list(tmp_path.glob("*.mtx"))) == 12
     M, q = mmread(tmp_path / "drum_4_M.mtx"), mmread(tmp_path / "drum_4_q.mtx").ravel()  # noqa: N806
     expected = lcp_logs.problems(12)["drum 4"]
-    np.testing.assert_array_equal(M.toarray(), expected.dense)
-    np.testing.assert_array_equal(q, expected.q)
+    np.testing.assert_allclose(M.toarray(), expected.dense, rtol=0.0, atol=1e-15 * expected.dense.max())  # one triangle is written
+    np.testing.assert_allclose(q, expected.q, rtol=1e-15)
     assert lcp_logs.main([str(tmp_path), "--logs", "5"]) == 2
 
 
@@ -88,7 +88,9 @@ def test_every_method_finds_the_answer_of_the_others():
 
 def test_interior_point_finds_the_answer():
     pytest.importorskip("clarabel")
-    assert lcp_claims.by_interior_point(network(30))["certificate"] < 1e-9
+    row = lcp_claims.by_interior_point(network(50))
+    assert row["status"] == "Solved"
+    assert row["certificate"] < 1e-9
 
 
 def test_survey_counts_what_is_there():
