@@ -1,0 +1,29 @@
+"""Dam break in space: a column that ends at x = 0, a tank around y = 0 with its floor at z = 0, and a box on it."""
+
+from dataclasses import replace
+
+from dembark.input_decks.common.setup import Parameters, Setup
+from dembark.input_decks.common.water import fluid_setup, full_spacings, wall_layers
+
+from .sensors import GAUGES, sensors
+
+
+def setup(p: Parameters) -> Setup:
+    """Column, tank and box with sides of whole spacings. The box keeps the place of its face, and the column that of its front."""
+    dx = p.spacing
+    column, end, top = (full_spacings(one, dx) for one in (p.column_length, p.tank_length - p.column_length, p.tank_height))
+    box = p.scene == "box"
+    side = 0.5 * p.across * dx
+    thick = wall_layers(p) * dx
+    # A slab's period is its width.
+    wide = side + thick if box else side
+    sizes = {f"box_{axis}": max(dx, full_spacings(one, dx)) for axis, one in zip("xyz", (p.box_length, p.box_width, p.box_height),
+                                                                                strict=True)}
+    seen, near = sensors(p.scene, p.distance if box else end, p.box_height), 2.0 * p.smoothing * dx
+    low, high = ([pick(place[axis] for place in seen.values()) + sign * near for axis in range(3)] for pick, sign in ((min, -1), (max, 1)))
+    numbers = {"spacing": dx, "sound_speed": p.sound_speed, "depth": p.column_depth, "filled_at_rest": 1, "grain_count": p.grain_count,
+               "particle_mass": p.fluid_density * dx**3, "column": column, "tank_end": end, "tank_top": top, "side": side, "thick": thick,
+               "low_y": -wide, "high_y": wide, "low_z": -thick, "high_z": top + thick, **sizes,
+               **{f"seen_{name}_{axis}": ends[k] for name, ends in (("low", low), ("high", high)) for k, axis in enumerate("xyz")}}
+    made = fluid_setup(p, (-column - thick, end + thick, -wide, wide), p.rows, **numbers)
+    return replace(made, tables={"gauge": tuple(GAUGES.values())})
