@@ -29,7 +29,7 @@ from dembark.postproc.measurement import (
 from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.studies import compared, measured, numerical, quantity
 
-from .pressures import baseline, marks, pressure_at, smoothed
+from .pressures import baseline, full, marks, pressure_at, smoothed
 from .sensors import GAUGES, sensors
 
 REFERENCE = Path(__file__).with_name("reference")
@@ -70,12 +70,21 @@ def traces(run: Replica) -> tuple[Array, dict[str, Array]]:
     places = sensors(p["scene"], p["distance"] if p["scene"] == "box" else d["tank_end"], d["box_z"])
     images = np.array([[0.0, k * 2.0 * d["side"], 0.0] for k in ((-1, 0, 1) if p["scene"] == "wall" else (0,))])
     h, weight, times, rows = p["smoothing"] * d["spacing"], p["fluid_density"] * p["gravity"], [0.0], [[0.0] * len(places)]
+    rooms = [full(point, h, d["spacing"], lambda at: solid(run, at)) for point in places.values()]
     for frame in GrainsDump(run.folder / "near.dump"):
         water = (frame.positions + images[:, None]).reshape(-1, 3)
         pressures = np.tile(frame.extra["p"], len(images)) if len(frame.ids) else np.zeros(0)
         times.append(frame.step * run.time_step)
-        rows.append([pressure_at(point, water, pressures, h, weight) for point in places.values()])
+        rows.append([pressure_at(point, water, pressures, h, weight, room) for point, room in zip(places.values(), rooms, strict=True)])
     return np.array(times), dict(zip(places, np.array(rows).T, strict=True))
+
+
+def solid(run: Replica, places: Array) -> Array:
+    """Which places (n, 3) are in the floor, and in the box or the far wall."""
+    p, d, (x, y, z) = run.parameters, run.derived, places.T
+    if p["scene"] == "wall":
+        return np.asarray((z < 0.0) | (x > d["tank_end"]))
+    return np.asarray((z < 0.0) | (z < d["box_z"]) & (np.abs(y) < 0.5 * d["box_y"]) & (x > p["distance"]) & (x < p["distance"] + d["box_x"]))
 
 
 @cached_per_replica

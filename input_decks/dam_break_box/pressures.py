@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -14,15 +14,35 @@ from dembark.postproc.measurement import Array
 DRY = 0.2
 
 
-def pressure_at(point: Sequence[float], places: Array, pressures: Array, h: float, weight: float) -> float:
+# Points of a lattice along one spacing, where the space around a sensor is summed.
+FINE = 4
+
+
+def kernel(distances: Array, h: float) -> Array:
+    """Wendland's kernel C2 over its value at 0, at `distances` (m, n) with the smoothing length `h` (m)."""
+    q = distances / h
+    return np.asarray(np.where(q < 2.0, (1.0 - 0.5 * q) ** 4 * (2.0 * q + 1.0), 0.0))
+
+
+def full(point: Sequence[float], h: float, spacing: float, solid: Callable[[Array], Array]) -> float:
+    """The sum of the kernel around the `point` (m) over particles of that `spacing` (m), if water filled all space that is not `solid`, of
+    places (n, 3)."""
+    fine = spacing / FINE
+    axis = fine * (np.arange(-math.ceil(2.0 * h / fine), math.ceil(2.0 * h / fine)) + 0.5)
+    # Its layers end on the floor.
+    upward = axis + fine * round(point[2] / fine) - point[2]
+    around = np.stack([part.ravel() for part in np.meshgrid(axis, axis, upward, indexing="ij")], axis=1)
+    weights = kernel(np.linalg.norm(around, axis=1), h)
+    return float(weights[~solid(np.asarray(point) + around)].sum()) / FINE**3
+
+
+def pressure_at(point: Sequence[float], places: Array, pressures: Array, h: float, weight: float, room: float) -> float:
     """Pressure (Pa) of the fluid at the `point` (m) of a wall, of its particles at `places` (n, 3), with their `pressures` (Pa, n), the
-    smoothing length `h` (m) and the `weight` ρ g (N/m³): what a wall's particle there would have (Adami, Hu & Adams 2012, eq. 27),
-    Σ (p + ρ g·(x - x_f)) W / Σ W with Wendland's kernel C2. 0 where no particle is nearer than 2 h, and not below."""
-    q = np.linalg.norm(places - np.asarray(point), axis=1) / h
-    kernel = np.where(q < 2.0, (1.0 - 0.5 * q) ** 4 * (2.0 * q + 1.0), 0.0)
-    if not kernel.any():
-        return 0.0
-    return max(0.0, float(kernel @ (pressures - weight * (point[2] - places[:, 2])) / kernel.sum()))
+    smoothing length `h` (m) and the `weight` ρ g (N/m³): Σ (p + ρ g·(x - x_f)) W / Σ W, as a particle of the wall there would have it
+    (Adami, Hu & Adams 2012, eq. 27). Where water is sparser than `room`, the sum of W over space that is full of it, its force on an area
+    of the wall is less in proportion: then Σ W is `room`. Not below 0."""
+    w = kernel(np.linalg.norm(places - np.asarray(point), axis=1), h)
+    return max(0.0, float(w @ (pressures - weight * (point[2] - places[:, 2])) / max(w.sum(), room)))
 
 
 def baseline(times: Array, trace: Array) -> float:
