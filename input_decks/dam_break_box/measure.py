@@ -29,7 +29,7 @@ from dembark.postproc.measurement import (
 from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.studies import compared, measured, numerical, quantity
 
-from .pressures import baseline, full, marks, pressure_at, smoothed
+from .pressures import Flags, baseline, full, marks, pressure_at, smoothed
 from .sensors import GAUGES, sensors
 
 REFERENCE = Path(__file__).with_name("reference")
@@ -79,12 +79,14 @@ def traces(run: Replica) -> tuple[Array, dict[str, Array]]:
     return np.array(times), dict(zip(places, np.array(rows).T, strict=True))
 
 
-def solid(run: Replica, places: Array) -> Array:
+def solid(run: Replica, places: Array) -> Flags:
     """Which places (n, 3) are in the floor, and in the box or the far wall."""
     p, d, (x, y, z) = run.parameters, run.derived, places.T
     if p["scene"] == "wall":
         return np.asarray((z < 0.0) | (x > d["tank_end"]))
-    return np.asarray((z < 0.0) | (z < d["box_z"]) & (np.abs(y) < 0.5 * d["box_y"]) & (x > p["distance"]) & (x < p["distance"] + d["box_x"]))
+    behind = x - p["distance"]
+    boxed = (behind > 0.0) & (behind < d["box_x"]) & (np.abs(y) < 0.5 * d["box_y"]) & (z < d["box_z"])
+    return np.asarray((z < 0.0) | boxed)
 
 
 @cached_per_replica

@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array
 
+Flags = NDArray[np.bool_]
 # Before this time (s) nothing is wet: pressures measured then are the offset of their sensors.
 DRY = 0.2
 
@@ -24,7 +26,7 @@ def kernel(distances: Array, h: float) -> Array:
     return np.asarray(np.where(q < 2.0, (1.0 - 0.5 * q) ** 4 * (2.0 * q + 1.0), 0.0))
 
 
-def full(point: Sequence[float], h: float, spacing: float, solid: Callable[[Array], Array]) -> float:
+def full(point: Sequence[float], h: float, spacing: float, solid: Callable[[Array], Flags]) -> float:
     """The sum of the kernel around the `point` (m) over particles of that `spacing` (m), if water filled all space that is not `solid`, of
     places (n, 3)."""
     fine = spacing / FINE
@@ -42,6 +44,8 @@ def pressure_at(point: Sequence[float], places: Array, pressures: Array, h: floa
     (Adami, Hu & Adams 2012, eq. 27). Where water is sparser than `room`, the sum of W over space that is full of it, its force on an area
     of the wall is less in proportion: then Σ W is `room`. Not below 0."""
     w = kernel(np.linalg.norm(places - np.asarray(point), axis=1), h)
+    if not w.any():
+        return 0.0
     return max(0.0, float(w @ (pressures - weight * (point[2] - places[:, 2])) / max(w.sum(), room)))
 
 
