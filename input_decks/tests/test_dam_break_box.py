@@ -172,6 +172,21 @@ def test_a_column_breaks_against_a_box_in_an_engine(simulate: Any) -> None:
     assert level[0] == 0.0 and 0.02 < level[-1] < 0.2
 
 
+def test_a_run_that_goes_on_has_the_same_rows_and_frames(decks: Any, tmp_path: Path) -> None:
+    """Also those of the water at the sensors, whose region a resumed run makes anew."""
+    one = decks("dam_break_box", "liggghts", tmp_path, {"resolution": 5, "run_time": 0.04, "frames": 2, "rows": 20})
+    one.run(restart_every=10)
+    files = [tmp_path / name for name in ("time.csv", "near.dump", "grains.dump")]
+    complete = [path.read_bytes() for path in files]
+    # The older one of two states.
+    states = {int(path.name.split(".")[1]) for path in tmp_path.glob("state.*.restart")}
+    assert len(states) == 2 and max(states) <= one.setup.steps
+    for path in tmp_path.glob(f"state.{max(states)}.*"):
+        path.unlink()
+    one.run(restart_every=10, resume="yes")
+    assert [path.read_bytes() for path in files] == complete
+
+
 def controls_dam_break_box(_folder: Path) -> Iterator[Control]:
     right, of_spacings = verdicts(), study()
     yield Control("a scheme that makes energy", right, verdicts(made=0.05))
