@@ -9,7 +9,7 @@ from .sensors import GAUGES, sensors
 
 
 def setup(p: Parameters) -> Setup:
-    """Column, tank and box with sides that are multiples of the spacing. The box keeps the place of its face, and the column that of its front."""
+    """Column, tank and box with sides of full spacings. The box keeps the place of its face, the column that of its front."""
     dx = p.spacing
     column, end, top = (full_spacings(one, dx) for one in (p.column_length, p.tank_length - p.column_length, p.tank_height))
     box = p.scene == "box"
