@@ -54,7 +54,7 @@ region          domain block -2 2 -2 2 -2 2 units box
 create_box      {types} domain
 neighbor        0.05 bin
 create_atoms    1 single 0 0 0 units box
-create_atoms    {types} single 0.199 0 0 units box
+create_atoms    {types} single 0.1995 0 0 units box
 set             group all diameter 0.2
 set             group all mass 50
 group           logs type 1:{types}

@@ -31,7 +31,7 @@ set             group all density 2500 diameter 0.005
 """
 LOGS = HEAD.format(box="-2 2 -2 2 -2 2", types="{types}", skin=0.05) + """
 create_atoms    1 single 0 0 0 units box
-create_atoms    {types} single 0.199 0 0 units box
+create_atoms    {types} single 0.1995 0 0 units box
 set             group all diameter 0.2
 set             group all mass 50
 group           logs type 1:{types}

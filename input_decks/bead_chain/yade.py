@@ -4,6 +4,8 @@ from yade import dembark
 
 p = dembark.parameters()
 materials, ids = dembark.begin(p, along=[0, 2] if p.columns > 1 else [])
+if p.columns > 1:
+    dembark.block(ids[1])
 writer = dembark.FrameWriter()
 
 
