@@ -59,12 +59,13 @@ def body(
     made = engines.RigidBody(
         called, density * mesh.mass.volume, tuple((a, b, c) for a, b, c in inertia.tolist()), at or (x, y, z),
         tuple((a, b, c, r) for a, b, c, r in rows), bodies.is_principal(inertia), spheres is None)
+    quality = bodies.fit(mesh, filled)
     try:
         out.mkdir(parents=True, exist_ok=True)
         files = [write_atomic(out / file, text.encode()) for file, text in engines.engine_class(engine).body_files(made).items()]
     except OSError as error:
         raise DembarkError(f"cannot write to {out}", error.strerror or str(error)) from None
-    print("\n".join([*_lines(given, bodies.fit(mesh, filled), made), *(f"written: {file}" for file in files)]))
+    print("\n".join([*_lines(given, quality, made), *(f"written: {file}" for file in files)]))
 
 
 def _place(text: str | None) -> tuple[float, float, float] | None:

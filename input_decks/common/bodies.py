@@ -32,6 +32,8 @@ SINGLE = 2e-7
 POINTS = 20_000
 # Points on a surface, and cells in a body, at which the spheres are compared with it.
 SEEN, CELLS = 5_000, 200_000
+# Cells of the box around a body, at most: a slender body that lies askew fills little of it.
+MOST_CELLS = 20_000_000
 
 
 @dataclass(frozen=True)
@@ -98,11 +100,10 @@ class Mesh:
 
     def turned(self) -> Mesh:
         """With the centre of mass at the origin and the principal axes along x, y and z, in ascending order of the moments. A body whose
-        axes are along them already keeps them as they are."""
+        axes are along them already is turned by right angles only."""
         inertia = self.mass.inertia
-        if is_principal(inertia):
-            return replace(self, points=self.points - self.mass.centre)
-        axes = np.linalg.eigh(inertia)[1]
+        axes = (np.eye(3)[:, np.argsort(np.diag(inertia), kind="stable")] if is_principal(inertia)
+                else np.linalg.eigh(inertia)[1])
         axes[:, 2] *= np.sign(np.linalg.det(axes))
         return replace(self, points=(self.points - self.mass.centre) @ axes)
 
@@ -237,6 +238,7 @@ def covering(mesh: Mesh, number: int) -> Spheres:
     """
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     spacing = float(np.cbrt(mesh.mass.volume / POINTS))
+    _require_few(high - low, spacing)
     points = _lattice(0.5 * (low + high), spacing, 2 * np.floor(0.5 * (high - low) / spacing).astype(int) + 1)
     depths = -mesh.distance(points)
     # Smaller ones would be there for one point only.
@@ -270,6 +272,7 @@ def fit(mesh: Mesh, spheres: Spheres) -> Fit:
     reach = spheres.radii[:, None]
     low, high = (spheres.centres - reach).min(axis=0), (spheres.centres + reach).max(axis=0)
     spacing = float(np.cbrt(mesh.mass.volume / CELLS))
+    _require_few(high - low, spacing)
     cells = _lattice(0.5 * (low + high), spacing, np.ceil((high - low) / spacing).astype(int))
     covered = np.zeros(len(cells), bool)
     tree = cKDTree(cells)
@@ -279,6 +282,13 @@ def fit(mesh: Mesh, spheres: Spheres) -> Fit:
     beyond = spheres.radii + mesh.distance(spheres.centres)
     return Fit(float(covered.sum() * spacing**3 / mesh.mass.volume), float(outside.max()),
                float(np.sqrt(np.mean(outside[len(mesh.points):] ** 2))), max(0.0, float(beyond.max())))
+
+
+def _require_few(extent: Array, spacing: float) -> None:
+    """DembarkError where a box of the `extent` (3,) has too many cells of the `spacing` (m)."""
+    if (cells := float(np.prod(extent / spacing))) > MOST_CELLS:
+        raise DembarkError("the body is too slender for the box around it", f"that has {cells:.1g} cells, at most {MOST_CELLS:.0e} fit",
+                           "turn the body along x, y and z (--principal)")
 
 
 def _on_surface(triangles: Array) -> Array:

@@ -42,4 +42,6 @@ def inside(grains: GrainFrame, contacts: ContactFrame, p: Numbers, area: float) 
                                p["contact_angle"], model=p["capillary_model"])
         pulls = (pull / apart)[:, None] * contacts.branch
         attraction = -float(np.trace(pair_stress(contacts.first, contacts.branch, pulls, 2, edges, area)[0])) / 3.0
-    return Inside(stress, attraction, fraction, high - low, 2.0 * len(contacts.ids) / float(free.sum()))
+    # A contact with a glued grain counts for one free grain only.
+    met = free[np.searchsorted(grains.ids, contacts.ids)].sum()
+    return Inside(stress, attraction, fraction, high - low, float(met) / float(free.sum()))

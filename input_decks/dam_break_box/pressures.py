@@ -72,10 +72,10 @@ def _integral(times: Array, trace: Array, summed: Array, at: Array) -> Array:
 
 def marks(times: Array, trace: Array, window: tuple[float, float]) -> tuple[float, float, float]:
     """Arrival, peak and impulse of a pressure `trace` (n,) at `times` (n,): when it first gets to a quarter of its peak, its largest value,
-    and its integral over the `window`, which ends with the trace if that is shorter."""
+    and its integral over the `window`, NaN where the trace ends before it."""
     peak = float(trace.max())
     edges = np.array(window)
     inside = (times > edges[0]) & (times < edges[1])
     t, p = np.concatenate([edges[:1], times[inside], edges[1:]]), np.interp(edges, times, trace)
-    impulse = float(np.trapezoid(np.concatenate([p[:1], trace[inside], p[1:]]), t))
+    impulse = float(np.trapezoid(np.concatenate([p[:1], trace[inside], p[1:]]), t)) if times[-1] >= edges[1] else math.nan
     return reached(times, trace, 0.25 * peak) if peak > 0.0 else math.nan, peak, impulse

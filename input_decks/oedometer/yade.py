@@ -11,8 +11,8 @@ plates = dembark.LoadedPlates(p, ids[2])
 
 def step():
     """Set the load, which doubles every p.octave_steps up to p.peak_step and is halved as fast from p.fall_step on; write what is due."""
-    if O.iter > p.start_step:
-        plates.load(2 ** ((min(O.iter, p.peak_step) - p.start_step - max(O.iter - p.fall_step, 0)) / p.octave_steps))
+    rising = max(min(O.iter, p.peak_step) - p.start_step, 0)
+    plates.load(2 ** ((rising - max(O.iter - p.fall_step, 0)) / p.octave_steps))
     plates.record()
 
 

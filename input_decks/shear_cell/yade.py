@@ -10,9 +10,8 @@ plates = dembark.LoadedPlates(p, ids[2])
 
 
 def step():
-    """Raise the load when it is time, and write what is due at this step."""
-    if O.iter in (p.second_load, p.third_load):
-        plates.load(2 if O.iter == p.second_load else 4)
+    """Set the load of this step, and write what is due at it."""
+    plates.load(1 if O.iter < p.second_load else 2 if O.iter < p.third_load else 4)
     plates.record()
 
 

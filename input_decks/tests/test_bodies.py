@@ -112,8 +112,19 @@ def test_principal_axes_are_turned_to_x_y_and_z():
     np.testing.assert_allclose(found.centre, 0, atol=1e-14)
     np.testing.assert_allclose(np.diag(found.inertia), np.linalg.eigvalsh(bodies.mass_properties(CORNER).inertia), rtol=1e-12)
     assert found.volume == pytest.approx(5.0)
-    # One that is along the axes keeps its edges there.
+    # One that is along the axes keeps its edges there, the longest along x.
     assert np.ptp(bodies.closed(CUBE, "cube").turned().points, axis=0).tolist() == [1, 1, 1]
+    bar = bodies.closed(CUBE * [1, 2, 5], "bar")
+    assert np.ptp(bar.turned().points, axis=0).tolist() == [5, 2, 1]
+    assert bar.turned().mass.volume == pytest.approx(10.0)
+
+
+def test_a_slender_body_askew_is_refused_before_it_fills_the_memory():
+    corners = (CUBE * [1, 0.004, 0.004]).reshape(-1, 3)
+    thin = bodies.closed(Rotation.from_euler("xyz", [0.3, 0.5, 0.7]).apply(corners).reshape(-1, 3, 3), "thin")
+    with pytest.raises(DembarkError, match="too slender for the box around it"):
+        bodies.covering(thin, 10)
+    assert len(bodies.covering(thin.turned(), 10).radii) == 10
 
 
 def pushed(triangles, corner, by):

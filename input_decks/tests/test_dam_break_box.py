@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -65,7 +66,8 @@ def test_marks_of_a_triangle_are_its_own(start: float, rise: float, height: floa
     assert arrival == pytest.approx(start + 0.25 * rise, abs=1e-3)
     assert peak == pytest.approx(height, rel=3e-3)
     assert impulse == pytest.approx(1.5 * rise * height, rel=1e-3)
-    # Half of it, and less of a window that ends before.
+    # None of a window that ends after the trace, half of one that ends at the peak.
+    assert math.isnan(dam.marks(times, trace, (0.2, 3.1))[2])
     assert dam.marks(times, trace, (start, start + rise))[2] == pytest.approx(0.5 * rise * height, rel=1e-2)
 
 

@@ -45,7 +45,8 @@ def compressed(*, k0: float = 0.64, loose: float = 0.0, power: float = 1.0 / 3.0
     sites[:, 2] += 0.5 * (layer == LAYERS - 1) - 0.5 * (layer == 0)
     frames = []
     largest = float(load(peak))
-    density = np.pi / 6.0 * 2.0 * sum(map(len, pairs.values())) / (SIDE**2 * (LAYERS - 2.0))
+    # Contacts of a grain, glued ones not counted.
+    density = np.pi / 6.0 * sum((types[pair] == 1).sum() for pair in pairs.values()) / (SIDE**2 * (LAYERS - 2.0))
     top = stiffness * float(oedometer.affine_modulus(np.asarray(largest * (1.0 + 2.0 * k0) / 3.0), np.asarray(density), p))
     # The share of the volume that the grains fill.
     size = D * np.cbrt(loose / (np.pi / 6.0)) if loose else D

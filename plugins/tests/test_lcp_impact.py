@@ -113,8 +113,8 @@ FLOOR = "stiffness 1e7 theta 0.5 wall plane floor y 0 lo stiffness 4e7"
 
 
 @pytest.mark.parametrize(("logs", "line"), [
-    ([Log((0.0, 0.5)), Log((0.198, 0.5))], "atom 1 and atom 2 overlap at the start by 0.02 of the radius; at most 0.01 is allowed"),
-    ([Log((0.0, 0.09)), Log((0.5, 0.5))], "atom 1 and wall floor overlap at the start by 0.1 of the radius; at most 0.01 is allowed")])
+    ([Log((0.0, 0.5)), Log((0.19, 0.5))], "atom 1 and atom 2 overlap at the start by 0.1 of the radius; at most 0.05 is allowed"),
+    ([Log((0.0, 0.09)), Log((0.5, 0.5))], "atom 1 and wall floor overlap at the start by 0.1 of the radius; at most 0.05 is allowed")])
 def test_overlaps_at_the_start_are_refused(engine, tmp_path, logs, line):
     for ranks in (1, 2):
         done = impact_decks.start(tmp_path / str(ranks), Case(logs, FLOOR, 1e-5, "run 1"), engine=engine, ranks=ranks)

@@ -230,8 +230,11 @@ void LcpImpact::checkStart() {
 void LcpImpact::prepare() {
 	const impact::Settings now = settings();
 	if (system && ::dembark::to_numbers(now) == ::dembark::to_numbers(system->settings())) return;
-	const std::string doubtful = impact::step_warning(now, logs, around);
-	if (!doubtful.empty()) dembark_yade::warn("LcpImpact: " + doubtful);
+	if (judgedDt != now.dt) {
+		judgedDt                   = now.dt;
+		const std::string doubtful = impact::step_warning(now, logs, around);
+		if (!doubtful.empty()) dembark_yade::warn("LcpImpact: " + doubtful);
+	}
 	const bool                begins = !system;
 	const std::vector<double> state  = system ? system->state() : std::vector<double>();
 	system                           = std::make_unique<impact::System>(now);

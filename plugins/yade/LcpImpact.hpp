@@ -120,6 +120,7 @@ private:
 	std::string                 wallName(std::size_t number) const;
 
 	std::unique_ptr<::dembark::impact::System> system;
+	Real                                       judgedDt = -1;  ///< of the last warning about the time step, or of none
 	::dembark::impact::ContactGeometry         around;
 	::dembark::impact::ImpactFile              file;
 	// Of the present step:

@@ -252,7 +252,7 @@ class ImpactChain:
     damping : N s/m, a number or (b,), on the absolute velocity of logs in contact
     contact_damping : N s/m, on the deformation of a contact; Galilean invariant
 
-    A start with an overlap of more than a hundredth of the smaller radius is refused. ValueError or TypeError: one line about the argument.
+    A start with an overlap of more than a twentieth of the smaller radius is refused. ValueError or TypeError: one line about the argument.
 
     >>> row = ImpactChain([20, 80], [1e7, 3e7], [0, 1e-5], [1.5, 0])
     >>> motion = row.run(0.01, 1.46e-6)
@@ -401,7 +401,7 @@ class ImpactSystem(_System):
     friction_sweeps : friction and normal forces are computed in turn so many times a step
     reach : m, gap up to which a pair is a candidate; 0 = as large as the motion of each step asks for
 
-    A start with an overlap of more than a hundredth of the smaller radius is refused. ValueError or TypeError: one line about the argument.
+    A start with an overlap of more than a twentieth of the smaller radius is refused. ValueError or TypeError: one line about the argument.
     """
 
     def __init__(self, mass: ArrayLike, radius: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None, *,
@@ -480,7 +480,7 @@ class CapsuleSystem(_System):
     friction, tangential_ratio, walls, theta, damping, contact_damping, friction_sweeps, method, reach : as in ImpactSystem
 
     Two logs, or a log and a wall, have up to two points of contact, and each of them is a row of `contacts()` and has impacts of its own.
-    Starts with an overlap of more than a hundredth of the radius are refused. ValueError or TypeError: one line about the argument.
+    Starts with an overlap of more than a twentieth of the radius are refused. ValueError or TypeError: one line about the argument.
 
     Model: G. N. Kolesnikov, Resources and Technology (2013); contacts of capsules: docs/theory/lcp.md.
 

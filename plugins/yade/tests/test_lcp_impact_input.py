@@ -100,7 +100,7 @@ CASES = [
     ("O.bodies[1].state.pos = (0, 0.1, 0.01)\nstep()", ("log 1 meets log 2 out of the plane", "one z")),
     ("O.bodies.appendClumped([sphere((1, 1, 0), 0.1), sphere((1.1, 1, 0), 0.1)])\nstep()", ("belongs to a clump", "mask or ids")),
     ("O.bodies[2].state.pos = (0.19, 0.1, 0)\nstep()",
-     ("LcpImpact: log 1 and log 2 overlap at the start by 0.1 of the radius; at most 0.01 is allowed",)),
+     ("LcpImpact: log 1 and log 2 overlap at the start by 0.1 of the radius; at most 0.05 is allowed",)),
     ("O.bodies[2].state.pos = (0.5, 0.08, 0)\nstep()", ("log 2 and LcpImpact.walls[0] 'floor' overlap at the start by 0.2 of the radius",)),
     ("step(ids=[0])", ("LcpImpact.ids: body 0 is no Sphere",)),
     ("step(ids=[9])", ("LcpImpact.ids: body 9 does not exist",)),

@@ -15,8 +15,9 @@ class LoadedPlates:
     """The plates of a deck with the numbers `p`, as the part plates.in of the other engines has them.
 
     The glued grains `ids`, first those of the lower plate, were added as held. The upper plate keeps its velocity `p.shear_speed` along x
-    and is free along z. `load(factor)` pushes it down with the part `p.grain_load` of the load times `factor` for each of its grains.
-    `record()`, once in every step, writes what is due: the rows of time.csv are means over their steps.
+    and is free along z. `load(factor)`, once in every step, pushes it down with the part `p.grain_load` of the load times `factor` for each
+    of its grains: YADE forgets a permanent force when it loads a scene, as it does after each saved state. `record()`, once in every step,
+    writes what is due: the rows of time.csv are means over their steps.
     """
 
     def __init__(self, p, ids):
@@ -34,10 +35,9 @@ class LoadedPlates:
         self.save, self.restore = self._means.save, self._means.load
         self._recorder = Recorder(p, {}, history=SimpleNamespace(write=self._write), report=p.stride)
         self._recorder.dump = DumpWriter({}, box(), "pp pp ff", gravity=(0, 0, 0), types=dict.fromkeys(ids, 2))
-        self.load(1.0)
 
     def load(self, factor):
-        """Push the plate down from the next step on."""
+        """Push the plate down in this step."""
         O.forces.setPermF(self._plate, (0, 0, -factor * self._p.grain_load * self._count))
 
     def _write(self):
