@@ -50,7 +50,7 @@ class Way:
 
 
 def gauss_jordan(M: Floats, q: Floats) -> Way:  # noqa: N803
-    """The algorithm of the source on the whole tableau, step by step; ends where a set of contacts comes back."""
+    """The algorithm of the source on the full tableau, step by step; ends where a set of contacts comes back."""
     n = len(q)
     table = np.column_stack([M, q]).astype(float)
     active = np.zeros(n, bool)
@@ -107,7 +107,7 @@ def survey(sizes: Sequence[int], samples: int) -> list[Row]:
         for seed in range(samples):
             for name, problem in families(count, seed).items():
                 result = solve_lcp(problem.M, problem.q, method="energy")
-                path = gauss_jordan(problem.dense, problem.q) if count <= 50 else None  # the whole tableau, for as long as that is quick
+                path = gauss_jordan(problem.dense, problem.q) if count <= 50 else None  # the full tableau, for as long as that is quick
                 found.setdefault(name, []).append({
                     "pivots": result.pivots, "active": int(result.active.sum()), "returned": result.used_fallback,
                     "rises": bool(path and (np.diff(path.energy) > 0.0).any()),
