@@ -9,8 +9,7 @@ import numpy as np
 
 from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
-from dembark.input_decks.dam_break.water import growth
-from dembark.input_decks.dam_break_cubes.measure import outside
+from dembark.input_decks.dam_break.water import Tank, growth
 from dembark.postproc import GrainsDump
 from dembark.postproc.convergence import convergence
 from dembark.postproc.measurement import (
@@ -67,7 +66,7 @@ def window(p: Numbers) -> tuple[float, float]:
 def traces(run: Replica) -> tuple[Array, dict[str, Array]]:
     """Times (s, n), and the pressure (Pa, n) at each sensor. Water of a periodic slab is also there a period to either side."""
     p, d = run.parameters, run.derived
-    places = sensors(p["scene"], p["distance"] if p["scene"] == "box" else d["tank_end"], d["box_z"])
+    places = sensors(p["scene"], p["distance"] if p["scene"] == "box" else d["tank_end"], d["box_z"], d["box_x"])
     images = np.array([[0.0, k * 2.0 * d["side"], 0.0] for k in ((-1, 0, 1) if p["scene"] == "wall" else (0,))])
     h, weight, times, rows = p["smoothing"] * d["spacing"], p["fluid_density"] * p["gravity"], [0.0], [[0.0] * len(places)]
     rooms = [full(point, h, d["spacing"], lambda at: solid(run, at)) for point in places.values()]
@@ -102,12 +101,11 @@ def astray(run: Replica) -> tuple[float, float]:
     flew over the walls."""
     p, d, half = run.parameters, run.derived, 0.5 * run.derived["spacing"]
     box = p["scene"] == "box"
-    tank = {"spacing": d["spacing"], "flume_width": 2.0 * d["side"] if box else PERIODIC, "column_length": d["column"],
-            "downstream_length": d["tank_end"], "flume_height": d["tank_top"], "gravity": p["gravity"]}
+    tank = Tank(d["column"], d["tank_end"], d["side"] if box else PERIODIC, d["tank_top"], d["thick"], d["spacing"], p["gravity"])
     centre, size = np.array([p["distance"] + 0.5 * d["box_x"], 0.0, 0.5 * d["box_z"]]), np.array([d[f"box_{axis}"] for axis in "xyz"])
     found = []
     for frame in run.grains():
-        through, over = outside(frame.positions, frame.velocities, tank, d["thick"])
+        through, over = tank.outside(frame.positions, frame.velocities)
         if box:
             through = through | (np.abs(frame.positions - centre) < 0.5 * size - half).all(axis=1)
         found.append((float(through.sum() + d["grain_count"] - len(frame.ids)), float(over.sum())))

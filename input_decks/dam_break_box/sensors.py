@@ -8,9 +8,10 @@ WALL = (0.003, 0.015, 0.030, 0.080)
 GAUGES = {"H1": 1.496, "H2": 1.000, "H3": 0.504, "H4": -0.646}
 
 
-def sensors(scene: str, face: float, top: float) -> dict[str, tuple[float, float, float]]:
-    """Places (m) of the sensors of the `scene` by name, with the face of box or wall at x = `face` (m) and the box `top` (m) high."""
+def sensors(scene: str, face: float, top: float, length: float) -> dict[str, tuple[float, float, float]]:
+    """Places (m) of the sensors of the `scene` by name, with the face of box or wall at x = `face` (m) and the box `top` (m) high and
+    `length` (m) long; those that such a box would not carry are left out."""
     if scene == "wall":
         return {f"at_{1e3 * z:g}_mm": (face, 0.0, z) for z in WALL}
-    return {**{f"P{k + 1}": (face, ACROSS, z) for k, z in enumerate(FACE)},
-            **{f"P{k + 5}": (face + x, ACROSS, top) for k, x in enumerate(TOP)}}
+    return {**{f"P{k + 1}": (face, ACROSS, z) for k, z in enumerate(FACE) if z <= top},
+            **{f"P{k + 5}": (face + x, ACROSS, top) for k, x in enumerate(TOP) if x <= length}}

@@ -6,7 +6,7 @@ from dembark.common.errors import DembarkError
 from dembark.input_decks.common.setup import Parameters, Setup
 from dembark.input_decks.common.water import fluid_setup, full_spacings, wall_layers
 
-from .sensors import FACE, GAUGES, TOP, sensors
+from .sensors import GAUGES, sensors
 
 
 def setup(p: Parameters) -> Setup:
@@ -20,10 +20,9 @@ def setup(p: Parameters) -> Setup:
     wide = side + thick if box else side
     sizes = {f"box_{axis}": max(dx, full_spacings(one, dx)) for axis, one in zip("xyz", (p.box_length, p.box_width, p.box_height),
                                                                                 strict=True)}
-    if box and min(sizes["box_x"], sizes["box_z"]) < (highest := max(*FACE, *TOP)):
-        raise DembarkError(f"the box is {sizes['box_x']:.3g} m long and {sizes['box_z']:.3g} m high, in full spacings of {dx:.3g} m",
-                           f"its sensors need {highest:.3g} m", "raise resolution, or the size of the box")
-    seen, near = sensors(p.scene, p.distance if box else end, sizes["box_z"]), 2.0 * p.smoothing * dx
+    seen, near = sensors(p.scene, p.distance if box else end, sizes["box_z"], sizes["box_x"]), 2.0 * p.smoothing * dx
+    if not seen:
+        raise DembarkError(f"a box of {p.box_length:g} m by {p.box_height:g} m carries no sensor", "", "make it 0.03 m long or high")
     low, high = ([pick(place[axis] for place in seen.values()) + sign * near for axis in range(3)] for pick, sign in ((min, -1), (max, 1)))
     numbers = {"spacing": dx, "sound_speed": p.sound_speed, "depth": p.column_depth, "filled_at_rest": 1, "grain_count": p.grain_count,
                "particle_mass": p.fluid_density * dx**3, "column": column, "tank_end": end, "tank_top": top, "side": side, "thick": thick,

@@ -154,6 +154,11 @@ STILL = {"scene": "wall", "resolution": 10, "column_length": 0.3, "column_depth"
          "run_time": 0.3, "frames": 2, "rows": 60}
 
 
+def test_sensors_that_a_small_box_would_not_carry_are_left_out() -> None:
+    assert set(dam.sensors("box", 1.0, 0.161, 0.161)) == {f"P{k}" for k in range(1, 9)}
+    assert set(dam.sensors("box", 1.0, 0.11, 0.08)) == {"P1", "P2", "P3", "P5", "P6"}
+
+
 def test_sensors_show_still_water_in_an_engine(simulate: Any) -> None:
     """A tank that its column fills: ρ g times the depth of each sensor, within a fifth of a layer of particles."""
     one = simulate("dam_break_box", "liggghts", STILL)

@@ -19,7 +19,7 @@ from dembark.validation.case.resolve import resolve
     ("debarking_drum", {"filling": 0.5, "log_diameter_min": 0.24, "log_count": 10},
      r"filling 0\.5 is too high, the drum has places for .* take a lower filling"),
     ("drive_power", {"youngs_modulus": 5e6, "motion_gamma": 3.0}, "raise youngs_modulus"),
-    ("dam_break_box", {"resolution": 5}, "raise resolution"),
+    ("dam_break_box", {"resolution": 100, "box_length": 0.01, "box_height": 0.01}, "make it 0.03 m long or high"),
     ("drive_power", {"time_step_fraction": 0.3}, "lower time_step_fraction"),
     ("drive_power", {"cell_width": 0.015}, "must be at least 4 grain_diameter"),
     ("drive_power", {"motion": "circular"}, "shake up and down"), ("drive_power", {"motion_amplitude": 0.002}, "not motion_amplitude"),
