@@ -63,8 +63,8 @@ def _facts(result: LcpResult) -> Row:
     return {"pivots": result.pivots, "block_steps": result.block_steps, "status": result.status, "active": int(result.active.sum())}
 
 
-def siconos(problem: Problem, name: str, wall: bool) -> Row:
-    """What a method of Siconos found, in a process of its own: `seconds`, `info`, `iterations` and `z`."""
+def peer(problem: Problem, name: str, wall: bool) -> Row:
+    """One call of a method of Siconos, in a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "problem.npz"
         np.savez(path, M=problem.dense, q=problem.q)
@@ -72,12 +72,7 @@ def siconos(problem: Problem, name: str, wall: bool) -> Row:
         done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **ONE_THREAD}, timeout=900)
     if done.returncode:
         raise RunError("Siconos", (done.stderr.strip().splitlines() or ["no message"])[-1], "it must find siconos.numerics")
-    return json.loads(done.stdout.strip().splitlines()[-1])[name]
-
-
-def peer(problem: Problem, name: str, wall: bool) -> Row:
-    """One call of a method of Siconos."""
-    found = siconos(problem, name, wall)
+    found = json.loads(done.stdout.strip().splitlines()[-1])[name]
     status = "solved" if found["info"] == 0 else f"info {found['info']}"
     return {"seconds": found["seconds"], "iterations": found["iterations"], "status": status,
             "certificate": certificate(problem, np.array(found["z"]))}

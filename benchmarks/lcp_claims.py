@@ -19,7 +19,7 @@ from scipy.optimize import lsq_linear
 
 from benchmarks import frame, lcp_logs
 from benchmarks.frame import HERE, say
-from benchmarks.lcp import MISSING, Row, siconos, siconos_version
+from benchmarks.lcp import MISSING, Row, peer, siconos_version
 from benchmarks.lcp_cases import Problem, certificate, coupled, network
 from dembark.common.errors import DembarkError
 from dembark.physics import solve_lcp
@@ -220,9 +220,8 @@ def solvers(peers: Sequence[str]) -> dict[str, Callable[[Problem], Row]]:
 
 def by_siconos(problem: Problem, name: str) -> Row:
     """A method of Siconos."""
-    found = siconos(problem, name, wall=False)
-    status = "solved" if found["info"] == 0 else f"info {found['info']}"
-    return {"steps": found["iterations"], "certificate": certificate(problem, np.array(found["z"])), "status": status}
+    found = peer(problem, name, wall=False)
+    return {"steps": found["iterations"], "certificate": found["certificate"], "status": found["status"]}
 
 
 def published_set() -> tuple[dict[str, Problem], int]:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
+from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Measurement, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.studies import fitted_exponent, measured
 
@@ -12,6 +13,8 @@ from dembark.postproc.studies import fitted_exponent, measured
 SPEED = 0.9055157
 # Contacts that are compared, as parts of the row.
 NEAR, FAR = 0.4, 0.8
+# Speed over that behind a front that spreads, at the place of the long waves: the integral of Airy's function over the part ahead.
+FOOT = 1.0 / 3.0
 
 
 def forces(run: Replica) -> tuple[Array, Array]:
@@ -46,7 +49,7 @@ def front(run: Replica) -> Measurement:
     due = lattice(rows, turn * times)
     number = np.arange(rows // 2 + rows // 16, rows // 2 + rows // 5)
     mean = speeds.mean(axis=2)
-    passed = np.array([arrival(times, mean[:, k]) for k in number])
+    passed = np.array([reached(times, mean[:, k], FOOT) for k in number])
     return Measurement({
         "front_speed": Value(exact(float(np.polyfit(passed, number, 1)[0]) / turn), exact(1.0)),
         "front_profile": Value(exact(float(np.abs(speeds - due[:, :, None]).max())), exact(0.0))},
@@ -60,15 +63,6 @@ def lattice(rows: int, phases: Array) -> Array:
     start = np.fft.rfft(np.where(np.arange(rows) < rows // 2, 2.0, 0.0))
     turns = 2.0 * np.sin(np.pi * np.arange(len(start)) / rows)
     return np.asarray(np.fft.irfft(start * np.cos(np.outer(phases, turns)), rows))
-
-
-def arrival(times: Array, speed: Array) -> float:
-    """Time (s) at which `speed` (n,) first is a third of that behind the front, NaN if never: a third, the
-    integral of Airy's function over the part ahead, is what a front that spreads has at the place of the long waves."""
-    k = int(np.argmax(speed > 1.0 / 3.0))
-    if k == 0:
-        return math.nan
-    return float(times[k - 1] + (1.0 / 3.0 - speed[k - 1]) / (speed[k] - speed[k - 1]) * (times[k] - times[k - 1]))
 
 
 def wave(run: Replica) -> Measurement:

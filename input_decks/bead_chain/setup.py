@@ -45,7 +45,7 @@ def layer(p: Parameters) -> Setup:
     count = len(number)
     bodies = Packing(box, places, np.full(count, p.grain_diameter), np.full(count, p.grain_density), np.ones(count, np.int64), speeds)
     output = strides(0.23 * rows / row_frequency(p), time_step(p), p.frames)
-    numbers = {**output, "first": output["stride"], "row_frequency": row_frequency(p), "apart": apart, **contacts(p, skin=0.2)}
+    numbers = {**output, "first": output["stride"], "row_frequency": row_frequency(p), **contacts(p, skin=0.2)}
     return Setup(output["steps"], time_step(p), bodies, numbers)
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from dembark.input_decks.common.estimates import over_chaotic, ratio
+from dembark.input_decks.oedometer.measure import FRACTIONS
 from dembark.postproc.measurement import Array, Estimate, Measurement, Replica, Replicas, Value, exact, profile
 from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.spheres import slice_volumes
 
-# Solid fractions of equal spheres with this coefficient of friction, compressed at low pressure, Agnolin and Roux (2007).
-FRACTIONS = {0.0: 0.639, 0.3: 0.593}
 # Random loose packing of rough spheres, Jerkins et al. (2008), and random close packing.
 LOOSEST, CLOSEST = 0.550, 0.639
 # Mean diameters of what is left out at the plate and below the surface, which lies above this share of the centres.

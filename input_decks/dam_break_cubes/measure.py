@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
+from dembark.input_decks.dam_break.water import Tank
 from dembark.postproc.convergence import convergence
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile
@@ -43,36 +44,23 @@ def pose(times: Mapping[str, Array], cube: int, row: int) -> tuple[Array, Rotati
             Rotation.from_quat([times[f"cube{cube}_q{part}"][row] for part in "xyzw"]))
 
 
-def outside(places: Array, velocities: Array, p: Mapping[str, Any], thick: float) -> tuple[Array, Array]:
-    """Which particles (n,) are in walls or the floor, deeper than half a spacing, or beyond them, and which have gone over the walls of
-    thickness `thick` (m): those that are above a wall, or were not lower than its top, back in free flight, at one of its faces. What
-    bounces on the top was so at the outer one only."""
-    dx, (x, y, z) = p["spacing"], places.T
-    half = 0.5 * p["flume_width"]
-    beyond = np.stack([y - half, -y - half, x - p["downstream_length"], -x - p["column_length"]])
-    speed = np.stack([velocities[:, 1], -velocities[:, 1], velocities[:, 0], -velocities[:, 0]])
-    crossed = np.full(len(z), -np.inf)
-    for face in (0.0, thick):
-        flying = (beyond > face) & (speed > 0.0)
-        since = np.max((beyond - face) / np.where(flying, speed, 1.0) * flying, axis=0)
-        crossed = np.fmax(crossed, z - velocities[:, 2] * since - 0.5 * p["gravity"] * since**2)
-    out = (beyond > 0.5 * dx).any(axis=0)
-    over = out & (crossed >= p["flume_height"])
-    return np.asarray((out | (z < -0.5 * dx)) & ~over), np.asarray(over)
+def tank(p: Mapping[str, Any], thick: float) -> Tank:
+    """The flume, with walls of the thickness `thick` (m)."""
+    return Tank(p["column_length"], p["downstream_length"], 0.5 * p["flume_width"], p["flume_height"], thick, p["spacing"], p["gravity"])
 
 
 @cached_per_replica
 def water(run: Replica) -> dict[str, float]:
     """What the frames of the fluid show."""
     p, times, dx = run.parameters, run.times(), run.parameters["spacing"]
-    count, half = int(run.derived["cube_count"]), 0.5 * p["edge"]
+    count, half, flume = int(run.derived["cube_count"]), 0.5 * p["edge"], tank(p, run.derived["layers"] * dx)
     found = {"inside": 0.0, "leaked": 0.0, "overtopped": 0.0, "gap_filled": float("nan"), "floor_wetted": float("nan")}
     fronts = [(0.0, 0.0)]  # s, and m: the foremost particle
     for frame in run.grains():
         places, now = frame.positions, frame.step * run.time_step
         row = int(np.argmin(np.abs(times["step"] - frame.step)))
         fronts.append((now, float(places[:, 0].max())))
-        through, over = outside(places, frame.velocities, p, run.derived["layers"] * dx)
+        through, over = flume.outside(places, frame.velocities)
         found["leaked"] = max(found["leaked"], float(through.sum() + run.derived["grain_count"] - len(frame.ids)))
         found["overtopped"] = max(found["overtopped"], float(over.sum()))
         poses = [pose(times, cube, row) for cube in range(1, count + 1)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dembark.input_decks.common.estimates import values_and_halves
-from dembark.input_decks.common.inside_layer import Inside, inside
+from dembark.input_decks.common.inside_layer import inside
 from dembark.input_decks.common.power_law import ordered
 from dembark.physics import effective_youngs_modulus
 from dembark.postproc.measurement import (
@@ -32,7 +32,7 @@ from dembark.postproc.studies import fitted_exponent, measured, propagated
 
 # Glass beads in slow flow, Jop et al. (2006): shear over normal stress.
 BEADS = 0.383
-# Solid fractions of equal spheres with this coefficient of friction, Agnolin and Roux (2007).
+# Solid fractions of equal spheres with this coefficient of friction, compressed at low pressure, Agnolin and Roux (2007).
 FRACTIONS = {0.0: 0.639, 0.3: 0.593}
 
 
@@ -58,8 +58,8 @@ class Loading:
 def read(replica: Replica) -> Loading:
     """The test of a run."""
     p, numbers, rows = replica.parameters, replica.derived, replica.times()
-    found: list[Inside] = [inside(grains, contacts, p, numbers["area"]) for grains, contacts in replica.paired_frames()]
-    steps = np.array([frame.step for frame in replica.grains()])
+    each = [(grains.step, inside(grains, contacts, p, numbers["area"])) for grains, contacts in replica.paired_frames()]
+    steps, found = np.array([step for step, _ in each]), [one for _, one in each]
     height = np.array([one.height for one in found])
 
     def load(at: Array) -> Array:
@@ -72,7 +72,7 @@ def read(replica: Replica) -> Loading:
     due = load(rows["step"][now] - 0.5 * numbers["every"]) * numbers["area"]
     stress = np.array([one.stress for one in found])
     return Loading(load(steps), stress[:, 2, 2], 0.5 * (stress[:, 0, 0] + stress[:, 1, 1]), np.array([one.fraction for one in found]),
-                np.array([one.coordination for one in found]), np.log(height[0] / height), int(np.argmax(steps >= numbers["peak_step"])),
+                   np.array([one.coordination for one in found]), np.log(height[0] / height), int(np.argmax(steps >= numbers["peak_step"])),
                    int(np.argmax(steps >= numbers["fall_step"])), rows["lower_fz"][now] / due, -rows["upper_fz"][now] / due)
 
 

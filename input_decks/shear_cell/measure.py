@@ -65,8 +65,7 @@ def line(normal: Array) -> tuple[Array, Array]:
 def read(replica: Replica) -> list[Shear]:
     """All loads of a run."""
     p, numbers, rows = replica.parameters, replica.derived, replica.times()
-    frames = [inside(grains, contacts, p, numbers["area"]) for grains, contacts in replica.paired_frames()]
-    steps = np.array([frame.step for frame in replica.grains()])
+    each = [(grains.step, inside(grains, contacts, p, numbers["area"])) for grains, contacts in replica.paired_frames()]
     found = []
     for number, factor in enumerate(LOADS):
         end = numbers["steps"] - (len(LOADS) - 1 - number) * numbers["load_steps"]
@@ -75,7 +74,7 @@ def read(replica: Replica) -> list[Shear]:
         lower_normal, lower_shear, upper_normal, upper_shear = (
             sign * rows[name][now] / numbers["area"] for name, sign in (("lower_fz", 1.0), ("lower_fx", -1.0), ("upper_fz", -1.0),
                                                                         ("upper_fx", 1.0)))
-        here = [frames[k] for k in np.flatnonzero((steps > begin) & (steps <= end))]
+        here = [frame for step, frame in each if begin < step <= end]
         found.append(Shear(factor * p["normal_stress"], lower_normal, lower_shear, upper_normal, upper_shear, here))
     return found
 

@@ -102,7 +102,7 @@ def test_what_goes_over_the_walls_has_not_leaked() -> None:
     for drop, found in ((-1e-6, [[False, False, True], [True, True, False]]), (1e-3, [[True, True, True], [False, False, False]])):
         height = 1.0 + fall - drop
         places = np.array([[1.0, 0.35 + thick + 2.0 * t, height], [-1.5 - thick - 2.0 * t, 0.0, height], [1.0, 0.3, -0.05]])
-        np.testing.assert_array_equal(dam.outside(places, v, p, thick), found)
+        np.testing.assert_array_equal(dam.tank(p, thick).outside(places, v), found)
 
 
 def test_what_bounces_on_the_top_of_a_wall_has_not_leaked() -> None:
@@ -110,13 +110,13 @@ def test_what_bounces_on_the_top_of_a_wall_has_not_leaked() -> None:
     p = defaults("dam_break_cubes")
     places = np.array([[1.247105, 0.370131, 1.050771], [1.210368, 0.4297332, 1.056744]])
     v = np.array([[-0.86871, 0.696412, -0.583182], [0.333574, 0.435077, 1.07171]])
-    np.testing.assert_array_equal(dam.outside(places, v, p, 0.075), [[False, False], [True, True]])
+    np.testing.assert_array_equal(dam.tank(p, 0.075).outside(places, v), [[False, False], [True, True]])
     # Past the inner edge of the top by 17 mm, and past the outer one below it by 0.4 mm.
     skimmed, w = np.array([[2.61688, 0.6475215, 0.7326508]]), np.array([[-0.988949, 1.3141, -2.40614]])
-    np.testing.assert_array_equal(dam.outside(skimmed, w, p, 0.075), [[False], [True]])
+    np.testing.assert_array_equal(dam.tank(p, 0.075).outside(skimmed, w), [[False], [True]])
     # In the wall, 20 mm below its top, and above the wall's inner half.
     places = np.array([[1.0, 0.39, 0.98], [1.0, 0.37, 1.01]])
-    np.testing.assert_array_equal(dam.outside(places, 0.0 * v, p, 0.075), [[True, False], [False, True]])
+    np.testing.assert_array_equal(dam.tank(p, 0.075).outside(places, 0.0 * v), [[True, False], [False, True]])
 
 
 def study(last: float, fallen: float = 1.1, standing: float = 0.0) -> dict[str, dict[str, Any]]:
