@@ -18,8 +18,8 @@
 namespace dembark {
 namespace impact {
 
-/// Overlap at the start over the smaller radius, at most: what loads at rest and impacts under way have in practice is allowed, n mg/k under
-/// n bodies; more is a mistake and throws bodies apart.
+/// Overlap at the start over the smaller radius, at most: what loads at rest and impacts under way have in practice is allowed, n mg/k
+/// under n bodies; more is a mistake and throws bodies apart.
 constexpr double most_overlap = 0.05;
 /// omega tau, at most, of a step that resolves impacts: a contact lasts pi steps.
 constexpr double longest_step = 1.0;
