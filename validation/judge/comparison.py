@@ -30,7 +30,7 @@ from dembark.common.errors import RunError
 from dembark.postproc.statistics import CONFIDENCE as INTERVAL
 from dembark.postproc.statistics import joint_limit, replica_mean, rescaled
 
-from .decision import PACKINGS, packings, smallest
+from .decision import PACKINGS, enough_packings, packings
 from .result import METRICS, ComparedRecord, Comparison, QuantityRecord, Result, read
 
 CAP = 0.10
@@ -108,8 +108,8 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
             verdict, reason = _judged(abs(deviation), *chance_of(0))
             chance = (1.0 - CONFIDENCE) / comparisons if verdict != "info" else 0.0
             if verdict == "info" and math.isfinite(few):
-                needed = smallest(lambda count: _judged(abs(deviation), *chance_of(count))[0] != "info", int(few))
-                decided = f"about {needed} packings in each engine"
+                needed = enough_packings(lambda count: _judged(abs(deviation), *chance_of(count))[0] != "info", int(few))
+                decided = f"{needed} in each engine"
     return ComparedRecord(
         name=value.name, label=value.label, unit=value.unit, value=value.value, interval=value.interval, reference=reference.value,
         reference_interval=reference.interval, deviation=deviation, deviation_kind=kind, tolerance=tolerance, verdict=verdict,

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dembark.postproc.statistics import rescaled
 
 PACKINGS = 3
-_MOST = 100_000
+# So many packings are beyond any campaign.
+_MOST = 1000
 
 
 def decides(deviation: float, own: float, reference: float, tolerance: float, basis: str) -> str:
@@ -29,8 +30,7 @@ def decides(deviation: float, own: float, reference: float, tolerance: float, ba
     if count < PACKINGS or not math.isfinite(own):
         return enough if count == 1.0 or not math.isfinite(own) else f"{enough}, or {longer}"
     if math.isfinite(count):
-        number = smallest(lambda number: rescaled(own, count, number) <= wanted, round(count))
-        return f"about {number} packings" if number < _MOST else f"more than {_MOST} packings"
+        return enough_packings(lambda number: rescaled(own, count, number) <= wanted, round(count))
     return longer if "block" in basis else f"inputs known well enough to change the value by at most {_limits(wanted, own)}"
 
 
@@ -47,10 +47,10 @@ def packings(basis: str) -> float:
     return int(found.group(1)) if found else math.inf
 
 
-def smallest(enough: Callable[[int], bool], least: int) -> int:
-    """The smallest number from `least` on that is `enough`, as all larger ones are."""
+def enough_packings(enough: Callable[[int], bool], least: int) -> str:
+    """In words: the smallest number of packings from `least` on that is `enough`, as all larger ones are."""
     low, high = least, _MOST
     while low < high:
         middle = (low + high) // 2
         low, high = (low, middle) if enough(middle) else (middle + 1, high)
-    return low
+    return f"about {low} packings" if low < _MOST else f"more than {_MOST} packings"
