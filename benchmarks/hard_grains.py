@@ -3,7 +3,7 @@
 `python -m benchmarks.hard_grains speed` prints events per second of processor time with 1000, 4000 and 10 000 spheres.
 `python -m benchmarks.hard_grains plate --gamma 16` prints the rise of the centre of mass (in d) with its 95 % interval, with the sizes,
 masses and motion of the case's variant `gas_16`, over a bed at rest whose centre is REST high.
-`python -m benchmarks.hard_grains map` compares height and power with those of the campaign `drive_power-standard`.
+`python -m benchmarks.hard_grains map` compares height, its spectrum, and power with those of the campaign `drive_power-standard`.
 docs/theory/hard_grains.md has the results.
 """
 
@@ -20,11 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from dembark.input_decks.drive_power.drive import spectrum
+from dembark.input_decks.drive_power.measure import SPECTRUM
 from dembark.physics import HardGrains, HardMotion, HardWall
 
 DIAMETER, DENSITY, GRAVITY, FREQUENCY, SIDE = 5e-3, 2500.0, 9.81, 25.0, 0.02
 # Diameters: of three packings of hard grains that have come to rest.
 REST = 1.762
+# Of a period.
+SAMPLES = 16
+QUANTITIES = ("height", "force_power", *SPECTRUM)
 
 
 def events_per_second(cells: int, fraction: float = 0.2, events: float = 1e6) -> float:
@@ -45,9 +50,9 @@ def events_per_second(cells: int, fraction: float = 0.2, events: float = 1e6) ->
 
 
 def shaken(gamma: float, seed: int, *, count: int = 60, restitution: float = 0.9, friction: float = 0.27, beta: float = 0.0,
-           contact_duration: float = 1e-5, periods: int = 30) -> tuple[float, float]:
-    """Mean height (d) of the centre of mass over the middle of the plate, and power of the plate over M g V, of `count` grains in the last
-    `periods` of 25 more, of which the first ten are the ramp."""
+           contact_duration: float = 1e-5, periods: int = 30) -> tuple[float, ...]:
+    """Of `count` grains in the last `periods` of 25 more, of which the first ten are the ramp: mean height (d) of the centre of mass over
+    the middle of the plate, power of the plate over M g V, and the `spectrum` (d) of that height."""
     random = np.random.default_rng(seed)
     diameter = random.uniform(0.9, 1.1, count) * DIAMETER
     place = np.array([[i, j, k] for k in range(-(-count // 9)) for i in range(3) for j in range(3)][:count]) + 0.5
@@ -59,10 +64,11 @@ def shaken(gamma: float, seed: int, *, count: int = 60, restitution: float = 0.9
                      tangential_restitution=beta, gravity=(0, 0, -GRAVITY), periods=[(0, SIDE), (0, SIDE), None], walls=[plate],
                      contact_duration=contact_duration)
     gas.run(25 / FREQUENCY)
-    motion = gas.run(periods / FREQUENCY, samples=8 * periods)
-    height = float(np.average(motion.position[1:, :, 2], weights=mass, axis=1).mean() / DIAMETER)
+    motion = gas.run(periods / FREQUENCY, samples=SAMPLES * periods)
+    heights = np.average(motion.position[1:, :, 2], weights=mass, axis=1).reshape(periods, SAMPLES) / DIAMETER
     speed = amplitude * 2 * np.pi * FREQUENCY
-    return height, float(np.diff(motion.wall_work[[0, -1], 0])[0] / (mass.sum() * GRAVITY * speed * periods / FREQUENCY))
+    power = float(np.diff(motion.wall_work[[0, -1], 0])[0] / (mass.sum() * GRAVITY * speed * periods / FREQUENCY))
+    return float(heights.mean()), power, *spectrum(heights)
 
 
 def compared(folder: Path, packings: int, law: Mapping[str, Any]) -> Iterator[str]:
@@ -75,8 +81,8 @@ def compared(folder: Path, packings: int, law: Mapping[str, Any]) -> Iterator[st
         hard = np.array([shaken(p["motion_gamma"], seed, count=p["grain_count"], restitution=p["restitution"], **law)
                          for seed in range(packings)])
         ratios = [f"{soft[name]['value'] / values.mean():.3f} ± {half_width(soft[name], values):.3f}"
-                  for name, values in zip(("height", "force_power"), hard.T, strict=True)]
-        yield f"{p['grain_count']:3d} {p['restitution']} {p['motion_gamma']:4.0f} {p['youngs_modulus']:.1e} {' '.join(ratios)}"
+                  for name, values in zip(QUANTITIES, hard.T, strict=True)]
+        yield f"{p['grain_count']:3d} {p['restitution']} {p['motion_gamma']:4g} {p['youngs_modulus']:.1e} {' '.join(ratios)}"
 
 
 def half_width(soft: Mapping[str, Any], hard: NDArray[np.float64]) -> float:
@@ -109,7 +115,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     law: dict[str, Any] = {"friction": given.friction, "beta": given.beta, "contact_duration": given.contact_duration}
     if given.what == "map":
-        print("grains, restitution, peak acceleration over g, Young's modulus (Pa); soft over hard: height, power")
+        print("grains, restitution, peak acceleration over g, Young's modulus (Pa); soft over hard: height, power, first and second harmonic and "
+              "fluctuation of the height")
         for row in compared(given.campaign, given.packings, law):
             print(row, flush=True)
         return 0

@@ -105,6 +105,12 @@ class Drive:
         """Mean height of the centre of mass over the middle of the plate in the measuring window (m)."""
         return block_mean(self._means(self.rows["weight_height"])[self.steady :] / self.weight)
 
+    def spectrum(self) -> tuple[float, float, float]:
+        """Of the height of the centre of mass in the measuring window (m): amplitudes of its first two harmonics of the drive, and the root
+        mean square of all else."""
+        rows = self.rows["weight_height"][self.ends[self.steady] + 1 : self.ends[-1] + 1].reshape(len(self.ends) - 1 - self.steady, -1)
+        return spectrum(rows / self.weight)
+
     def kinetic(self) -> Estimate:
         """Mean kinetic energy in the measuring window (J)."""
         return block_mean(self._means(self.rows["kinetic_energy"])[self.steady :])
@@ -134,6 +140,15 @@ class Drive:
     def rise_time(self) -> float:
         """Periods until the rise is steady."""
         return self.reached(self._means(self.heights()))
+
+
+def spectrum(heights: Array) -> tuple[float, float, float]:
+    """Of `heights` (periods, times): amplitudes of the first two harmonics of the period, and the root mean square of all else but the mean."""
+    mean = heights.mean(axis=0)
+    harmonics = np.fft.rfft(mean)[1:3]
+    kept = np.fft.irfft(np.concatenate([[mean.sum()], harmonics]), len(mean))
+    first, second = 2.0 * np.abs(harmonics) / len(mean)
+    return float(first), float(second), float(np.sqrt(np.mean((heights - kept) ** 2)))
 
 
 def read(replica: Replica) -> Drive:

@@ -20,6 +20,8 @@ STICKS = 0.3
 RISE = {2: 1.4, 3: 1.0}
 # Middle of the measured range of the exponent of the number of grains, with its sign turned.
 FALL = 0.5
+# Parts of Drive.spectrum.
+SPECTRUM = ("height_first_harmonic", "height_second_harmonic", "height_fluctuation")
 
 
 def measure(replicas: Replicas) -> Measurement:
@@ -52,6 +54,7 @@ def measure(replicas: Replicas) -> Measurement:
         "flight": Value(over(Drive.flight), exact(block.flight) if block else None),
         "rise": Value(over(Drive.rise, diameter)),
         "height": Value(over(Drive.height, diameter)),
+        **{name: once(lambda one, k=k: one.spectrum()[k] / diameter) for k, name in enumerate(SPECTRUM)},
         "kinetic_energy": Value(over(Drive.kinetic, runs[0].weight * diameter)),
         "power_time": once(Drive.power_time),
         "rise_time": once(Drive.rise_time),

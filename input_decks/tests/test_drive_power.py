@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import brentq
 
-from dembark.input_decks.drive_power.drive import LONGEST, sticking_block
+from dembark.input_decks.drive_power.drive import LONGEST, spectrum, sticking_block
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.postproc import DumpError
 from dembark.validation.case.deck import prepare
@@ -70,6 +70,12 @@ def spoiled(**factors: float) -> Any:
     for name, factor in factors.items():
         rows[name] = factor * rows[name]
     return run
+
+
+def test_spectrum_splits_a_signal_into_its_harmonics_and_the_rest() -> None:
+    time = np.arange(40 * 16).reshape(40, 16) / 16
+    signal = 3.0 + 0.5 * np.sin(2 * np.pi * time + 0.3) + 0.2 * np.cos(4 * np.pi * time) + 0.1 * np.sqrt(2) * np.sin(np.pi * time)
+    assert spectrum(signal) == pytest.approx((0.5, 0.2, 0.1), abs=1e-12)
 
 
 @pytest.mark.parametrize(("acceleration", "flight", "power"), [
