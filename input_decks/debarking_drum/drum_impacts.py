@@ -162,6 +162,7 @@ def estimates(drum: Drum) -> dict[str, Estimate]:
         "impacts_per_log": mean(counts, 4.0 / drum.logs),
         "peak_force_mean": of_impacts(lambda peaks: float(peaks.mean()), drum.peak),
         "peak_force_p99": of_impacts(lambda peaks: float(np.percentile(peaks, 99.0)), drum.peak),
+        "peak_force_max": Estimate(float(drum.peak.max(initial=0.0)), math.inf, "one load: only several loads give an interval"),
         "impulse_sum": mean(impulse, 4.0),
         "dissipated_energy": mean(lost, 4.0),
         "torque_arm": mean(torque, 4.0 / (rows * drum.weight * drum.radius)),
