@@ -16,11 +16,15 @@ from .statistics import CONFIDENCE, Estimate, block_mean, exact, over_replicas
 if TYPE_CHECKING:
     import xarray as xr
 
+    from .output.vtkhdf import Surface
+
 __all__ = ["CONFIDENCE", "Array", "Curve", "Estimate", "Measurement", "Numbers", "Points", "Replica", "Replicas", "Value", "block_mean",
            "exact", "number", "over_replicas", "pooled", "profile"]
 
 # The fields of a series next to its metrics.json.
 FIELDS_FILE = "fields.nc"
+# A map on a surface, there as well.
+SURFACE_FILE = "surface.vtkhdf"
 # Parameters of a run by name, in SI units.
 Numbers = Mapping[str, Any]
 # What `profile` returns.
@@ -60,12 +64,13 @@ class Value:
 @dataclass(frozen=True)
 class Measurement:
     """All that is measured of the replicas of a run: `values` by the names that case.toml declares, `profiles` (see `profile`), `remarks`
-    in words, and `fields` on a grid."""
+    in words, `fields` on a grid, and a map on a `surface`."""
 
     values: Mapping[str, Value]
     profiles: Sequence[Mapping[str, Any]] = ()
     remarks: Sequence[str] = ()
     fields: xr.Dataset | None = field(default=None)
+    surface: Surface | None = field(default=None)
 
 
 def number(value: float, reference: float | None = None, **more: Any) -> Value:

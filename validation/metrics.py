@@ -10,7 +10,7 @@ from typing import Any
 
 from dembark.common.errors import RunError
 from dembark.common.files import read_json
-from dembark.postproc.measurement import FIELDS_FILE, Measurement
+from dembark.postproc.measurement import FIELDS_FILE, SURFACE_FILE, Measurement
 from dembark.postproc.replica import Replica
 from dembark.validation import analysis, engines, provenance, results
 from dembark.validation.case import deck
@@ -34,8 +34,8 @@ def _complete(record: dict[str, Any]) -> dict[str, Any]:
 
 
 def measure(folder: Path, wanted: int | None = None) -> Result:
-    """Measure the replicas in `folder`, of which there are to be `wanted`, and judge what was measured; `measurement.json` keeps it, and
-    `fields.nc` its fields. What was measured before of the same inputs is not measured again.
+    """Measure the replicas in `folder`, of which there are to be `wanted`, and judge what was measured; `measurement.json` keeps it,
+    `fields.nc` its fields and `surface.vtkhdf` its map on a surface. What was measured before of the same inputs is not measured again.
 
     RunError when there is no finished replica, or one of their files cannot be read: a result is complete or not there.
     """
@@ -65,7 +65,7 @@ def measure(folder: Path, wanted: int | None = None) -> Result:
 
 def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str) -> measurement_file.Measured:
     (folder / measurement_file.FILE).unlink(missing_ok=True)
-    fields = ""
+    files = []
     with analysis.collected_warnings() as warnings:
         found = measurement.measure(case, runs)
         if runs[0].record.get("fitted"):
@@ -74,11 +74,16 @@ def _measure(folder: Path, case: Case, runs: Sequence[Replica], inputs_hash: str
             # Of the extra `fields`, which cases without fields do without.
             from dembark.postproc.output.netcdf import write_netcdf
 
-            fields = FIELDS_FILE
-            write_netcdf(folder / fields, found.fields)
+            files.append(FIELDS_FILE)
+            write_netcdf(folder / FIELDS_FILE, found.fields)
+        if found.surface is not None:
+            from dembark.postproc.output.vtkhdf import write_surface
+
+            files.append(SURFACE_FILE)
+            write_surface(folder / SURFACE_FILE, found.surface)
     gone = filter(None, (analysis.departed(one.folder) for one in runs))
-    noted = replace(found, remarks=[*found.remarks, *gone, *dict.fromkeys(warnings)], fields=None)
-    return measurement_file.write(folder, measurement_file.Measured(inputs_hash, noted, provenance.measured(), fields))
+    noted = replace(found, remarks=[*found.remarks, *gone, *dict.fromkeys(warnings)], fields=None, surface=None)
+    return measurement_file.write(folder, measurement_file.Measured(inputs_hash, noted, provenance.measured(), tuple(files)))
 
 
 def _fitted(folder: Path, record: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -21,7 +21,7 @@ from dembark.validation.case.model import Case
 _HERE = Path(__file__).parent
 KEY = "inputs_hash"
 # Of what `measurement_file` keeps: another number measures everything anew.
-_FORMAT = 3
+_FORMAT = 4
 
 
 def digest(*facts: Any) -> str:

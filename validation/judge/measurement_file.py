@@ -19,33 +19,33 @@ FILE = "measurement.json"
 
 @dataclass(frozen=True)
 class Measured:
-    """A measurement without its fields, which are in the file `fields` if there are any; `inputs_hash`: see `inputs`; `facts`: when it was
-    measured, and by which commit."""
+    """A measurement without fields and map, which are in `files` of the folder if there are any; `inputs_hash`: see `inputs`; `facts`: when
+    it was measured, and by which commit."""
 
     inputs_hash: str
     found: Measurement
     facts: Mapping[str, Any]
-    fields: str = ""
+    files: tuple[str, ...] = ()
 
 
 def write(folder: Path, one: Measured) -> Measured:
     """Write it into the `folder` of the series; returns what `read` gives."""
     values = {name: asdict(value) for name, value in one.found.values.items()}
     content = {KEY: one.inputs_hash, "measured": dict(one.facts), "values": values,
-               "profiles": list(one.found.profiles), "remarks": list(one.found.remarks), "fields": one.fields}
+               "profiles": list(one.found.profiles), "remarks": list(one.found.remarks), "files": list(one.files)}
     # Infinite half-widths are kept as Python's JSON writes them: no other program reads this file.
     write_atomic(folder / FILE, (json.dumps(content, indent=1, default=float) + "\n").encode())
     return read(folder, one.inputs_hash) or one
 
 
 def read(folder: Path, inputs_hash: str) -> Measured | None:
-    """The measurement in `folder`; None when there is none of the inputs `inputs_hash`, or its fields are gone."""
+    """The measurement in `folder`; None when there is none of the inputs `inputs_hash`, or one of its files is gone."""
     content = read_json(folder / FILE)
-    if content is None or content.get(KEY) != inputs_hash or not (folder / content["fields"]).exists():
+    if content is None or content.get(KEY) != inputs_hash or not all((folder / name).exists() for name in content["files"]):
         return None
     values = {name: Value(**entry | {part: _estimate(entry[part]) for part in ("estimate", "reference")})
               for name, entry in content["values"].items()}
-    return Measured(inputs_hash, Measurement(values, content["profiles"], content["remarks"]), content["measured"], content["fields"])
+    return Measured(inputs_hash, Measurement(values, content["profiles"], content["remarks"]), content["measured"], tuple(content["files"]))
 
 
 def _estimate(given: dict[str, Any] | None) -> Estimate | None:
