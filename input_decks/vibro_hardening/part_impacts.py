@@ -1,43 +1,47 @@
-"""Impacts on a clamped part, from a record of all grains that touch it every few steps: how often, how hard, and what friction does. The
-record touches.dump has frames `stride` steps apart, with the grains that the part pushes in that step. An impact begins in a frame whose
-predecessor does not have the grain, and ends with the last frame that does."""
+"""Impacts on a part, from a record of all grains that touch it every few steps: how often, how hard, where, and what friction and wear do.
+The record touches.dump has frames `stride` steps apart, with the grains that the part pushes in that step. An impact begins in a frame
+whose predecessor does not have the grain, and ends with the last frame that does."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.physics.exact.contact_law import solved
+from dembark.physics.exact.impacts import Impacts
 from dembark.postproc import GrainsDump
 from dembark.postproc.measurement import Array, Curve, Estimate, profile
+from dembark.postproc.output.vtkhdf import Surface
 from dembark.postproc.statistics import block_mean
+from dembark.postproc.walls.mesh import cut
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from dembark.physics import WallMotion
-
-
-def nearest(corners: Array, places: Array) -> Array:
-    """Points (n, 2) of the closed polygon `corners` (k, 2) in m that are nearest to `places` (n, 2)."""
-    sides = np.roll(corners, -1, axis=0) - corners
-    along = np.einsum("nka,ka->nk", places[:, None] - corners, sides) / (sides**2).sum(axis=1)
-    points = corners + np.clip(along, 0.0, 1.0)[..., None] * sides
-    return np.asarray(points[np.arange(len(places)), np.argmin(((points - places[:, None]) ** 2).sum(axis=2), axis=1)])
+    from dembark.postproc.walls import MeshWall
 
 
 @dataclass(frozen=True)
 class ContactRecord:
-    """All (n,) samples of grains on the part: `steps`, `ids`, `masses` (kg), `closing` (m/s): speed towards the part along its normal,
-    `forces` (n, 3) of the part on the grain (N), `rubbing` (W): friction times slip; of a window of `periods` periods of `period` s after
-    the step `first`, sampled every `stride` steps of `time_step` s; `area` of the part (m2)."""
+    """All (n,) samples of grains on the part: `steps`, `ids`, `masses` (kg), `radii` (m), `closing` (m/s): speed towards the part along its
+    normal, `slip` (m/s): speed of the centre along the part; `points` (n, 3): nearest points of the part where it was at rest (m);
+    `normals` (n, 3), to the grain; `forces` (n, 3) of the part on the grain (N); `rubbing` (W): friction times slip of the grain's surface.
+    Of a window of `periods` periods of `period` s after the step `first`, sampled every `stride` steps of `time_step` s; `area` of the part
+    (m2)."""
 
     steps: NDArray[np.int64]
     ids: NDArray[np.int64]
     masses: Array
+    radii: Array
     closing: Array
+    slip: Array
+    points: Array
+    normals: Array
     forces: Array
     rubbing: Array
     stride: int
@@ -56,13 +60,20 @@ class ContactRecord:
         begins[order[1:]] = ~same
         return begins & (self.closing > 0.0) & (self.steps > self.first)
 
+    @property
+    def window(self) -> float:
+        """Length (s)."""
+        return self.periods * self.period
+
     def _by_period(self, values: Array, chosen: NDArray[np.bool_]) -> Array:
         number = ((self.steps[chosen] - self.first - 1) * self.time_step / self.period).astype(int)
         return np.bincount(np.clip(number, 0, self.periods - 1), values[chosen], self.periods).astype(float)
 
-    def rate(self) -> Estimate:
-        """Impacts per second."""
-        return block_mean(self._by_period(np.ones(len(self.steps)), self.begins) / self.period)
+    def rate(self, values: Array | None = None) -> Estimate:
+        """Impacts per second; or what the `values` (impacts,) of the impacts add up to per second."""
+        every = np.zeros(len(self.steps))
+        every[self.begins] = 1.0 if values is None else values
+        return block_mean(self._by_period(every, self.begins) / self.period)
 
     def energies(self) -> Array:
         """Energies (impacts,) in J of the normal motion, m v^2 / 2: the part is far heavier than a grain."""
@@ -89,11 +100,66 @@ class ContactRecord:
         inside = self.steps > self.first
         return np.asarray(self.forces[inside].sum(axis=0) * self.stride * self.time_step)
 
+    def paths(self) -> tuple[Array, Array]:
+        """Speeds (impacts,) in m/s of the centres, and angles (impacts,) in rad of their paths from the surface."""
+        closing, slip = self.closing[self.begins], self.slip[self.begins]
+        return np.hypot(closing, slip), np.arctan2(closing, slip)
 
-def read_record(path: Path, motion: WallMotion, corners: Array, *, stride: int, time_step: float, first: int, periods: int, period: float,
-                 depth: float) -> ContactRecord:
-    """The record `path` of a part whose cross-section in the plane of x and z has the `corners` (k, 2) at rest (m), is `depth` (m) wide
-    and moves as `motion`; the window begins with step `first`."""
+    def shadows(self, modulus: float, restitution: float) -> tuple[Array, Array]:
+        """Peak forces (impacts,) in N and durations (impacts,) in s of the same impacts, each solved anew as that of a single grain, with
+        another `modulus` (Pa, E*)."""
+        chosen = self.begins
+        return lone_impacts(self.masses[chosen], self.radii[chosen], self.closing[chosen], modulus, restitution)
+
+    def peaks(self) -> Array:
+        """Largest recorded forces (impacts,) in N along the normal, while the grain stays on the part."""
+        order = np.lexsort((self.steps, self.ids))
+        begins = self.begins[order]
+        apart = np.append(True, (np.diff(self.ids[order]) != 0) | (np.diff(self.steps[order]) != self.stride))
+        push = np.einsum("na,na->n", self.forces, self.normals)[order]
+        starts = np.flatnonzero(apart)
+        found = np.zeros(len(order))
+        if len(starts):
+            found[order[starts]] = np.maximum.reduceat(push, starts)
+        assert apart[begins].all()
+        return found[self.begins]
+
+    def normal_force(self) -> Array:
+        """Sum (frames, 3) in N of the normal forces of the part on the grains, in each frame of the window."""
+        last = self.first + round(self.window / self.time_step)
+        frames = np.arange(self.first + self.stride, last + 1, self.stride)
+        inside = self.steps > self.first
+        push = np.einsum("na,na->n", self.forces, self.normals)[:, None] * self.normals
+        number = (self.steps[inside] - self.first) // self.stride - 1
+        return np.column_stack([np.bincount(number, column, len(frames))[: len(frames)] for column in push[inside].T])
+
+
+def lone_impacts(masses: Array, radii: Array, closing: Array, modulus: float, restitution: float) -> tuple[Array, Array]:
+    """Peak forces (n,) in N and durations (n,) in s of grains with `masses` (kg) and `radii` (m) that each hit a plane of infinite mass
+    with the speeds `closing` (m/s) along its normal: Hertz with the `modulus` (Pa, E*) and the dashpot of this `restitution`."""
+    one, (harder, longer) = _on_plane(masses, radii, closing, modulus, restitution), _damped(restitution)
+    return harder * one.peak_force, longer * one.duration
+
+
+def _on_plane(masses: Array, radii: Array, closing: Array, modulus: float, restitution: float) -> Impacts:
+    one, zero = np.ones_like(masses), np.zeros((2, len(masses)))
+    return Impacts(modulus * one, modulus * one, restitution * one, 0.0 * one, np.array([radii, np.inf * one]),
+                   np.array([masses, np.inf * one]), zero, np.array([-closing, 0.0 * one]), zero)
+
+
+@cache
+def _damped(restitution: float) -> tuple[float, float]:
+    """Peak force and duration over those of an elastic impact: the law has no speed or size of its own, so they hold for all."""
+    one = np.ones(1)
+    unit = _on_plane(one, one, one, 1.0, restitution)
+    damped = solved(unit)
+    return float(damped.force[0] / unit.peak_force[0]), float(damped.duration[0] / unit.duration[0])
+
+
+def read_record(path: Path, motion: WallMotion, part: MeshWall, *, stride: int, time_step: float, first: int, periods: int, period: float,
+                depth: float) -> ContactRecord:
+    """The record `path` of a `part`, which is where it is at rest and moves as `motion`; the window begins with step `first`. The layer of
+    grains is `depth` (m) wide, so much of the part counts in its area."""
     dump = GrainsDump(path)
     # In most frames nothing touches the part: these need not be read.
     frames = [dump[int(number)] for number in np.flatnonzero(dump.counts)]
@@ -104,24 +170,77 @@ def read_record(path: Path, motion: WallMotion, corners: Array, *, stride: int, 
 
     forces, places = np.concatenate([frame.wall_forces["vessel"] for frame in frames]), column("positions")
     shift, speed = motion.displacement(steps * time_step), motion.velocity(steps * time_step)
-    here = places[:, [0, 2]] - shift[:, [0, 2]]
-    away = here - nearest(corners, here)
+    here = places - shift
+    points = part.places(here).points
+    away = here - points
     length = np.linalg.norm(away, axis=1, keepdims=True)
-    normal = np.zeros_like(places)
-    normal[:, [0, 2]] = away / length
+    normal = away / length
     own = column("velocities") - speed
+
+    def along(vectors: Array) -> Array:
+        return np.asarray(vectors - np.einsum("na,na->n", vectors, normal)[:, None] * normal)
+
     surface = own + np.cross(column("omegas"), -length * normal)
-    push = np.einsum("na,na->n", forces, normal)
-    slip = surface - np.einsum("na,na->n", surface, normal)[:, None] * normal
-    rubbing = -np.einsum("na,na->n", forces - push[:, None] * normal, slip)
-    around = float(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1).sum())
-    return ContactRecord(steps, column("ids").astype(np.int64), column("masses"), -np.einsum("na,na->n", own, normal), forces, rubbing,
-                         stride, time_step, first, periods, period, around * depth)
+    rubbing = -np.einsum("na,na->n", along(forces), along(surface))
+    around = float(np.linalg.norm(np.diff(cut(part.triangles), axis=1), axis=2).sum())
+    return ContactRecord(steps, column("ids").astype(np.int64), column("masses"), column("radii"), -np.einsum("na,na->n", own, normal),
+                         np.linalg.norm(along(own), axis=1), points, normal, forces, rubbing, stride, time_step, first, periods, period,
+                         around * depth)
 
 
 def histogram(runs: list[ContactRecord], unit: float) -> Curve:
     """Curve of the impacts per second over the logarithm of their energy in units of `unit` (J)."""
-    edges = np.linspace(-4.0, 2.0, 25)
-    found = [np.histogram(np.log10(one.energies() / unit), bins=edges)[0] / (one.periods * one.period) for one in runs]
-    return profile("impacts", "Impacts on the part", "log₁₀ of the energy / (m V² / 2)", "impacts per second and bin",
-                   0.5 * (edges[1:] + edges[:-1]), found)
+    return _counts("impacts", "Impacts on the part", "log₁₀ of the energy / (m V² / 2)", np.linspace(-4.0, 2.0, 25), runs,
+                   [one.energies() / unit for one in runs])
+
+
+def force_histogram(runs: list[ContactRecord], forces: list[Array]) -> Curve:
+    """Curve of the impacts per second over the logarithm of their peak `forces` (impacts,) in N of each run."""
+    return _counts("forces", "Peak forces on the part", "log₁₀ of the peak force / N", np.linspace(-1.0, 4.0, 26), runs, forces)
+
+
+def _counts(name: str, title: str, along: str, edges: Array, runs: list[ContactRecord], values: list[Array]) -> Curve:
+    found = [np.histogram(np.log10(own), bins=edges)[0] / one.window for one, own in zip(runs, values, strict=True)]
+    return profile(name, title, along, "impacts per second and bin", 0.5 * (edges[1:] + edges[:-1]), found)
+
+
+def strips(part: MeshWall, size: float) -> Array:
+    """The section of the `part` by y = 0 as straight pieces (k, 2, 2) of x and z in m, none longer than `size` (m)."""
+    pieces = []
+    for one, other in cut(part.triangles):
+        parts = max(1, int(np.ceil(np.linalg.norm(other - one) / size - 1e-9)))
+        ends = one + np.linspace(0.0, 1.0, parts + 1)[:, None] * (other - one)
+        pieces.append(np.stack([ends[:-1], ends[1:]], axis=1))
+    return np.concatenate(pieces)
+
+
+def nearest(pieces: Array, places: Array) -> NDArray[np.int64]:
+    """Number (n,) of the one of the straight `pieces` (k, 2, 2) that is nearest to each of `places` (n, 2)."""
+    start, sides = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
+    along = np.einsum("nka,ka->nk", places[:, None] - start, sides) / (sides**2).sum(axis=1)
+    points = start + np.clip(along, 0.0, 1.0)[..., None] * sides
+    return np.asarray(np.argmin(((points - places[:, None]) ** 2).sum(axis=2), axis=1), np.int64)
+
+
+def surface_map(part: MeshWall, runs: list[ContactRecord], forces: list[Array], volumes: list[Array], depth: float) -> Surface:
+    """What impacts of all `runs` do to strips of the part, as long as the layer of grains is wide (`depth`, m) and up to half of that wide:
+    impacts and energy a second and area, largest and mean of the peak `forces` (N), and depth that is worn away a second, by `volumes`
+    (m^3) of the impacts of each run."""
+    pieces = strips(part, 0.5 * depth)
+    count, window = len(pieces), sum(one.window for one in runs)
+    cell = np.concatenate([nearest(pieces, one.points[one.begins][:, [0, 2]]) for one in runs])
+    areas = depth * np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1)
+
+    def total(values: list[Array]) -> Array:
+        return np.asarray(np.bincount(cell, np.concatenate(values), count), float)
+
+    hits, largest = np.bincount(cell, minlength=count), np.zeros(count)
+    np.maximum.at(largest, cell, np.concatenate(forces))
+    values = {
+        "impacts": (hits / (window * areas), "m-2 s-1"), "energy": (total([one.energies() for one in runs]) / (window * areas), "W m-2"),
+        "largest_force": (largest, "N"), "mean_force": (total(forces) / np.maximum(hits, 1), "N"),
+        "wear": (total(volumes) / (window * areas), "m s-1"),
+    }
+    # Corners of each strip in turn.
+    corners = [np.insert(pieces[:, end], 1, side * depth, axis=1) for end, side in ((0, -0.5), (1, -0.5), (1, 0.5), (0, 0.5))]
+    return Surface(np.stack(corners, axis=1).reshape(-1, 3), np.arange(4 * count).reshape(-1, 4), values)

@@ -7,7 +7,7 @@ weight = (0, 0, -p.gravity)
 materials, ids = dembark.begin(p, weight)
 dembark.block(ids[1])
 walls = {name: dembark.mesh(f"{name}.stl", materials[1]) for name in ("trough", "part")}
-moving = dembark.motion(p, walls, ["trough", "part"])
+moving = dembark.motion(p, walls, *((["trough", "part"], []) if p.part_held == "clamped" else (["trough"], ["part"])))
 history = dembark.machine_history(ids[1], weight, moving)
 vessel = {"vessel": [*walls["trough"], *walls["part"]]}
 frames = dembark.Recorder(p, vessel, boundary="ff ff ff", gravity=weight, history=history, report=p.stride)
