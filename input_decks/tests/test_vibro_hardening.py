@@ -20,7 +20,15 @@ from dembark.input_decks.common.trough import polygon, prism
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.input_decks.tests.synthetic_bed import PERIOD, PERIODS, trough
 from dembark.input_decks.tests.test_vibro_finishing import account
-from dembark.input_decks.vibro_hardening.part_impacts import ContactRecord, lone_impacts, nearest, read_record, strips, surface_map
+from dembark.input_decks.vibro_hardening.part_impacts import (
+    ContactRecord,
+    lone_impacts,
+    mean_pressures,
+    nearest,
+    read_record,
+    strips,
+    surface_map,
+)
 from dembark.input_decks.vibro_hardening.throws import angles
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.dumps import grains_text
@@ -173,6 +181,8 @@ def test_lone_impacts_of_elastic_grains_are_those_of_hertz() -> None:
     depth = (1.25 * mass * speed**2 / stiffness) ** 0.4
     force, lasts = lone_impacts(*np.array([[mass], [radius], [speed]]), modulus, 1.0)
     assert force[0] == pytest.approx(stiffness * depth**1.5, rel=1e-6) and lasts[0] == pytest.approx(2.943275 * depth / speed, rel=1e-4)
+    # Of the contact's area pi a^2 = pi R depth.
+    assert mean_pressures(force, np.array([radius]), modulus)[0] == pytest.approx(force[0] / (np.pi * radius * depth), rel=1e-6)
 
 
 def test_the_map_has_what_the_impacts_did_where_they_were(tmp_path: Path) -> None:

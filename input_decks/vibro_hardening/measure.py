@@ -18,7 +18,7 @@ from dembark.postproc.studies import measured
 from dembark.postproc.walls import MeshWall
 from dembark.postproc.wear import removed_volume
 
-from .part_impacts import ContactRecord, force_histogram, histogram, lone_impacts, read_record, surface_map
+from .part_impacts import ContactRecord, force_histogram, histogram, lone_impacts, mean_pressures, read_record, surface_map
 from .part_noise import Noise, octave_curves
 from .throws import angles
 
@@ -93,6 +93,9 @@ def measure(replicas: Replicas) -> Measurement:
         "wear_peak": Value(over_chaotic([float(wear.max() / np.average(wear, weights=surface.areas))])),
         "peak_force": Value(over_chaotic(float(own.mean()) for own in forces)),
         "peak_force_99": Value(over_chaotic(float(np.quantile(own, 0.99)) for own in forces)),
+        "dents": Value(over_chaotic(
+            float((mean_pressures(own, one.radii[one.begins], true_modulus(p)) > p["flow_pressure"]).mean())
+            for one, own in zip(records, forces, strict=True))),
         "lone_impact": Value(over_chaotic(lone_impact(one, p) for one in records), exact(1.0)),
         "octave_sum": Value(exact(max(abs(one.unexplained) for one in noise)), exact(0.0)),
         "pulse_noise": Value(over_chaotic(one.ratio for one in noise)),

@@ -141,6 +141,12 @@ def lone_impacts(masses: Array, radii: Array, closing: Array, modulus: float, re
     return harder * one.peak_force, longer * one.duration
 
 
+def mean_pressures(forces: Array, radii: Array, modulus: float) -> Array:
+    """Mean pressures (n,) in Pa of contacts of spheres with `radii` (n,) and a plane under `forces` (n,) in N: Hertz, a^3 = 3 F R / (4
+    E*), with the `modulus` E* (Pa)."""
+    return np.asarray(forces / (np.pi * (0.75 * forces * radii / modulus) ** (2.0 / 3.0)))
+
+
 def _on_plane(masses: Array, radii: Array, closing: Array, modulus: float, restitution: float) -> Impacts:
     one, zero = np.ones_like(masses), np.zeros((2, len(masses)))
     return Impacts(modulus * one, modulus * one, restitution * one, 0.0 * one, np.array([radii, np.inf * one]),

@@ -1,5 +1,5 @@
-"""Values on a surface as VTKHDF (version 2.0, PolyData), which ParaView opens from version 5.12 on. The format has no place for units: they
-are text in the field data, `units`, a line for each array."""
+"""Values on a surface for ParaView, in the format VTKHDF (version 2.0, PolyData). It has no place for units: they are text in the field
+data, `units`, a line for each array."""
 
 from __future__ import annotations
 
