@@ -158,7 +158,7 @@ def _damped(restitution: float) -> tuple[float, float]:
     """Peak force and duration over those of an elastic impact: the law has no speed or size of its own, so they hold for all."""
     one = np.ones(1)
     unit = _on_plane(one, one, one, 1.0, restitution)
-    damped = solved(unit)
+    damped = solved(unit, 100)
     return float(damped.force[0] / unit.peak_force[0]), float(damped.duration[0] / unit.duration[0])
 
 
