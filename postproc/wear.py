@@ -2,8 +2,8 @@
 
 A grain of mass m that arrives with the speed v at the angle a from the surface cuts it like a tool. The surface presses against it with
 the flow pressure p; the ratio of the normal to the tangential force, K, and that of the height of the contact to the depth of the cut, psi,
-are constant. The grain turns freely, with the inertia m r^2 / 2 about the edge that cuts. It ends cutting when its edge leaves the surface
-(flat angles) or stops (steep ones), and has then removed the volume
+are constant. The grain has no spin before, and turns freely about its centre, with the inertia m r^2 / 2 and the edge at the distance r. It
+ends cutting when its edge leaves the surface (flat angles) or stops (steep ones), and has then removed the volume
 
     m v^2 / (psi K p) (sin 2a - 6 / K sin^2 a) for tan a <= K / 6,   m v^2 / (psi K p) K / 6 cos^2 a for steeper ones.
 """

@@ -180,9 +180,9 @@ def test_lone_impacts_of_elastic_grains_are_those_of_hertz() -> None:
     stiffness = 4.0 / 3.0 * modulus * np.sqrt(radius)
     depth = (1.25 * mass * speed**2 / stiffness) ** 0.4
     force, lasts = lone_impacts(*np.array([[mass], [radius], [speed]]), modulus, 1.0)
-    assert force[0] == pytest.approx(stiffness * depth**1.5, rel=1e-6) and lasts[0] == pytest.approx(2.943275 * depth / speed, rel=1e-4)
+    assert force[0] == pytest.approx(stiffness * depth**1.5, rel=1e-4) and lasts[0] == pytest.approx(2.943275 * depth / speed, rel=1e-4)
     # Of the contact's area pi a^2 = pi R depth.
-    assert mean_pressures(force, np.array([radius]), modulus)[0] == pytest.approx(force[0] / (np.pi * radius * depth), rel=1e-6)
+    assert mean_pressures(force, np.array([radius]), modulus)[0] == pytest.approx(force[0] / (np.pi * radius * depth), rel=1e-4)
 
 
 def test_the_map_has_what_the_impacts_did_where_they_were(tmp_path: Path) -> None:
