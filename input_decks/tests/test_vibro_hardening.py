@@ -200,6 +200,19 @@ def test_the_map_has_what_the_impacts_did_where_they_were(tmp_path: Path) -> Non
     assert made.values["largest_force"][0][hit] == 59.0 and made.values["mean_force"][0][hit] == pytest.approx(29.5)
 
 
+def test_octaves_of_a_record_are_those_of_its_impacts_and_of_its_length(tmp_path: Path) -> None:
+    """Impacts at even times that are half sines of the recorded peak and duration; and a window that is too short for low bands."""
+    hits = record(tmp_path)
+    pulses = hits.peaks() / np.sin(0.5 * np.pi * (LASTS - 1) / LASTS), np.full(60, LASTS * STRIDE * STEP)
+    whole = hardening.Noise(hits, pulses, pulses)
+    assert whole.ratio == pytest.approx(1.0, abs=0.1) and abs(whole.unexplained) < 1e-12
+    short = replace(hits, periods=1, period=0.02)
+    with np.errstate(invalid="ignore"):
+        few = hardening.Noise(short, pulses, pulses)
+    recorded, hard = hardening.octave_curves([few, few])
+    assert 10 ** recorded["place"][0] == pytest.approx(50.1, abs=0.1) and len(hard["place"]) == 31
+
+
 def test_a_thrown_grain_that_misses_fails(tmp_path: Path) -> None:
     found = judged("vibro_hardening", hardening.thrown(throws(tmp_path), defaults("vibro_hardening", thrown_speed=1.0, grain_count=7)))
     assert names(found, "fail") == {"thrown_wear", "thrown_force"}

@@ -35,9 +35,10 @@ class Noise:
 
     @property
     def ratio(self) -> float:
-        """Mean square of lone impacts over the recorded one in the bands COMPARED."""
-        first, last = band_of(COMPARED) - self.bands.numbers[0]
-        return float(self.soft[first : last + 1].sum() / self.recorded[first : last + 1].sum())
+        """Mean square of lone impacts over the recorded one in the bands COMPARED; nan of a record without these."""
+        first, last = band_of(COMPARED)
+        here = (self.bands.numbers >= first) & (self.bands.numbers <= last)
+        return float(self.soft[here].sum() / self.recorded[here].sum()) if here.any() else math.nan
 
     @property
     def audible(self) -> float:
@@ -51,7 +52,7 @@ def octave_curves(noise: list[Noise]) -> list[Curve]:
         return np.asarray(10.0 * np.log10(np.maximum(squares, 1e-12)))
 
     along, across = "log₁₀ of the mid-band frequency / Hz", "dB, 10 lg of the mean square / N²"
-    low = int(band_of(AUDIBLE[0]))
+    low = max(int(band_of(AUDIBLE[0])), *(int(one.bands.numbers[0]) for one in noise))
     top = min(int(one.bands.numbers[-1]) for one in noise)
     chosen = [slice(low - int(one.bands.numbers[0]), top + 1 - int(one.bands.numbers[0])) for one in noise]
     soft = np.mean([one.soft[part] for one, part in zip(noise, chosen, strict=True)], axis=0)
