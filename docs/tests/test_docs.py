@@ -98,7 +98,7 @@ def test_parts_of_yade_decks_have_the_arguments_that_the_page_names() -> None:
             elif isinstance(node, ast.FunctionDef):
                 arguments[node.name] = node.args
     assert {name for name, _ in rows} == {"begin", "Recorder", "contact_loop", "engine_loop", "machine_history", "LoadedPlates",
-                                          "sort_materials", "of_sorts"}
+                                          "StressedCell", "sort_materials", "of_sorts"}
     for name, named in rows:
         assert set(named.split(", ")) <= {one.arg for one in arguments[name].args}
 

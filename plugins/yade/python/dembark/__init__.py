@@ -4,6 +4,7 @@ The files have the schema of the LIGGGHTS decks. Standard library only; SI units
 """
 
 from yade.dembark.balance import Balance
+from yade.dembark.cells import StressedCell
 from yade.dembark.fluids import CubesRecorder, FluidRecorder, FluidWriter, fluid, fluid_engine, fluid_loop, lattice, tank_walls
 from yade.dembark.frames import FrameWriter, StepMeans
 from yade.dembark.friction import set_friction
@@ -36,8 +37,9 @@ from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energi
 
 __all__ = [
     "Balance", "CubesRecorder", "DumpWriter", "EnergyWriter", "FluidRecorder", "FluidWriter", "FrameWriter", "HistoryWriter",
-    "LoadedPlates", "LogWriter", "Recorder", "StepMeans", "TouchWriter", "begin", "block", "box", "contact_loop", "drum", "energies",
-    "engine_loop", "fail", "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall", "logs",
-    "machine_history", "materials", "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "of_sorts", "options", "packing",
-    "pairs", "parameters", "periodic", "plane", "planes", "run", "set_friction", "slab_loop", "sort_materials", "table", "tank_walls",
+    "LoadedPlates", "LogWriter", "Recorder", "StepMeans", "StressedCell", "TouchWriter", "begin", "block", "box", "contact_loop", "drum",
+    "energies", "engine_loop", "fail", "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall",
+    "logs", "machine_history", "materials", "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "of_sorts", "options",
+    "packing", "pairs", "parameters", "periodic", "plane", "planes", "run", "set_friction", "slab_loop", "sort_materials", "table",
+    "tank_walls",
 ]
