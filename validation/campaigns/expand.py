@@ -65,7 +65,7 @@ def _points(sweep: SweepSpec, where: str) -> Iterator[Point]:
     """Points of one sweep; two that come to the same numbers are a mistake."""
     seen: dict[tuple[Value, ...], str] = {}
     for base in sweep.variants:
-        for row, quantiles in zip(sweep.rows, sweep.drawn.quantiles if sweep.drawn else repeat(()), strict=False):
+        for number, (row, quantiles) in enumerate(zip(sweep.rows, sweep.drawn.quantiles if sweep.drawn else repeat(()), strict=False)):
             name = variant_name(base, row, sweep.name)
             try:
                 changes, resolved = sweep.changes(base, row), sweep.resolved(base, row)
@@ -74,8 +74,18 @@ def _points(sweep: SweepSpec, where: str) -> Iterator[Point]:
             twin = seen.setdefault(tuple(resolved.values()), name)
             if twin != name:
                 raise DembarkError(f"points {twin} and {name} are the same run", where, "remove one of them")
+            own = _packings(sweep, number, changes, resolved)
             axes = {"variant": base, **row} if len(sweep.variants) > 1 else dict(row)
-            yield Point(sweep, name, base, axes, changes, resolved, quantiles)
+            yield Point(sweep, name, base, axes, {**changes, **own}, {**resolved, **own}, quantiles)
+
+
+def _packings(sweep: SweepSpec, number: int, changes: Mapping[str, Value], resolved: Mapping[str, Value]) -> Mapping[str, Value]:
+    """The seed of the point with this `number` (from 0) of a calibration, whose packings are its own: some that all points shared would
+    shift the results of all alike, and a fit would take that for an effect of the parameters."""
+    seed = resolved.get("seed")
+    if not (sweep.sample and sweep.sample.targets) or not isinstance(seed, int) or "seed" in changes:
+        return {}
+    return {"seed": seed + number * int(resolved.get("replicas") or 1)}
 
 
 def points(spec: CampaignSpec) -> list[Point]:

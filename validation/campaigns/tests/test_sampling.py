@@ -249,6 +249,22 @@ def test_targets(target: str, expected: str, tmp_path: Path, monkeypatch: pytest
     assert error.count("\n") == 1 and expected in error
 
 
+def test_points_of_a_fit_have_packings_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Packings that all points shared would shift all of them alike; those of a sample without targets are shared, as in a grid."""
+    monkeypatch.delenv("DEMBARK_DECKS")
+    target = "apparent_mass_ratio = { value = 0.6, uncertainty = 0.02 }\n"
+    free = FIT.replace("[sweeps.sample.targets]\n", "")
+
+    def seeds(text: str) -> list[int]:
+        return [int(point.resolved["seed"] or 0) for point in points(read(write(tmp_path, text)))]
+
+    plain, own = seeds(free), seeds(FIT.replace("[[sweeps]]\n", "[[sweeps]]\nreplicas = 3\n") + target)
+    assert len(plain) > 4 and len(set(plain)) == 1
+    assert own == list(range(plain[0], plain[0] + 3 * len(own), 3))
+    # Unless the file says otherwise.
+    assert set(seeds(FIT.replace("[sweeps.sample]\n", "fixed = { seed = 7 }\n[sweeps.sample]\n") + target)) == {7}
+
+
 def test_a_fit_needs_targets_and_a_design_that_fills_the_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                                                 capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.delenv("DEMBARK_DECKS")
