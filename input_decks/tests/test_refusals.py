@@ -20,6 +20,9 @@ from dembark.validation.case.resolve import resolve
      r"filling 0\.5 is too high, the drum has places for .* take a lower filling"),
     ("drive_power", {"youngs_modulus": 5e6, "motion_gamma": 3.0}, "raise youngs_modulus"),
     ("dam_break_box", {"resolution": 100, "box_length": 0.01, "box_height": 0.01}, "make it 0.03 m long or high"),
+    # Walls and cubes of particles end where their lattice does.
+    ("dam_break_cubes", {"spacing": 0.03, "slit_pressure": 0.0, "courant": 0.36}, "column_height must be a multiple"),
+    ("dam_break_cubes", {"spacing": 0.02, "slit_pressure": 0.0}, "edge must be a multiple"),
     ("drive_power", {"time_step_fraction": 0.3}, "lower time_step_fraction"),
     ("drive_power", {"cell_width": 0.015}, "must be at least 4 grain_diameter"),
     ("drive_power", {"motion": "circular"}, "shake up and down"), ("drive_power", {"motion_amplitude": 0.002}, "not motion_amplitude"),
