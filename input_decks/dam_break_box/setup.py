@@ -10,7 +10,8 @@ from .sensors import GAUGES, sensors
 
 
 def setup(p: Parameters) -> Setup:
-    """Column, tank and box with sides of full spacings. The box keeps the place of its face, the column that of its front."""
+    """Column, tank and box with sides of full spacings. The box keeps the places of its face and its top, the column that of its front:
+    the lowest layer of the box is up to half a spacing off the lattice of the floor."""
     dx = p.spacing
     column, end, top = (full_spacings(one, dx) for one in (p.column_length, p.tank_length - p.column_length, p.tank_height))
     box = p.scene == "box"
@@ -18,8 +19,8 @@ def setup(p: Parameters) -> Setup:
     thick = wall_layers(p) * dx
     # A slab's period is its width.
     wide = side + thick if box else side
-    sizes = {f"box_{axis}": max(dx, full_spacings(one, dx)) for axis, one in zip("xyz", (p.box_length, p.box_width, p.box_height),
-                                                                                strict=True)}
+    sizes = {name: max(dx, full_spacings(one, dx)) for name, one in (("box_x", p.box_length), ("box_y", p.box_width))}
+    sizes |= {"box_z": p.box_height, "box_foot": p.box_height - max(dx, full_spacings(p.box_height, dx))}
     seen, near = sensors(p.scene, p.distance if box else end, sizes["box_z"], sizes["box_x"]), 2.0 * p.smoothing * dx
     if not seen:
         raise DembarkError(f"a box of {p.box_length:g} m by {p.box_height:g} m carries no sensor", "", "make it 0.03 m long or high")
