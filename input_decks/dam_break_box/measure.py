@@ -10,6 +10,7 @@ import numpy as np
 from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.dam_break.water import Tank, growth
+from dembark.input_decks.dam_break.water import pressure as fluid_pressure
 from dembark.postproc import GrainsDump
 from dembark.postproc.convergence import convergence
 from dembark.postproc.measurement import (
@@ -71,8 +72,10 @@ def traces(run: Replica) -> tuple[Array, dict[str, Array]]:
     h, weight, times, rows = p["smoothing"] * d["spacing"], p["fluid_density"] * p["gravity"], [0.0], [[0.0] * len(places)]
     rooms = [full(point, h, d["spacing"], lambda at: solid(run, at)) for point in places.values()]
     for frame in GrainsDump(run.folder / "near.dump"):
+        if frame.step == 0:
+            continue
         water = (frame.positions + images[:, None]).reshape(-1, 3)
-        pressures = np.tile(frame.extra["p"], len(images)) if len(frame.ids) else np.zeros(0)
+        pressures = np.tile(fluid_pressure(frame), len(images)) if len(frame.ids) else np.zeros(0)
         times.append(frame.step * run.time_step)
         rows.append([pressure_at(point, water, pressures, h, weight, room) for point, room in zip(places.values(), rooms, strict=True)])
     return np.array(times), dict(zip(places, np.array(rows).T, strict=True))

@@ -2,6 +2,7 @@
 
 import math
 import os
+from itertools import compress
 
 from yade import ForceResetter, NewtonIntegrator, Omega, PyRunner, SphFluid
 from yade.dembark.frames import FrameWriter
@@ -55,25 +56,26 @@ def fluid_engine():
     return found
 
 
-def fluid(p, points, depth=None):
-    """A fluid in the plane with the parameters of the group `fluid`, `spacing` and `sound_speed`, and particles at `points` (m), below the
-    level `depth` (m) with the pressure of rest."""
-    water = SphFluid(spacing=p.spacing, soundSpeed=p.sound_speed, dimension=2, density=p.fluid_density, smoothing=p.smoothing,
+def fluid(p, points, depth=None, dimension=2):
+    """A fluid in the plane, or in space, with the parameters of the group `fluid`, `spacing` and `sound_speed`, and particles at `points`
+    (m), below the level `depth` (m) with the pressure of rest. Up is the last axis."""
+    water = SphFluid(spacing=p.spacing, soundSpeed=p.sound_speed, dimension=dimension, density=p.fluid_density, smoothing=p.smoothing,
                      alpha=p.alpha, delta=p.delta, noSlip=p.no_slip == "yes", tension=p.tension == "yes",
                      threads=int(os.environ.get("OMP_NUM_THREADS", "1")))
-    level = depth or 0.0
-    water.addParticles(points, pressures=[p.fluid_density * p.gravity * max(level - y, 0.0) for _, y, _ in points])
+    level, up = depth or 0.0, dimension - 1
+    water.addParticles(points, pressures=[p.fluid_density * p.gravity * max(level - point[up], 0.0) for point in points])
     return water
 
 
 def fluid_loop(p, water, push=None):
-    """Engines of a fluid in the plane and free bodies without contacts; the deck has `record`, a FluidRecorder.
+    """Engines of a fluid and free bodies without contacts; the deck has `record`, a FluidRecorder.
 
     push: Python that is run in each step, to add forces to bodies
     """
     O.dt = p.time_step
+    weight = (0, -p.gravity, 0) if water.dimension == 2 else (0, 0, -p.gravity)
     return [ForceResetter(), *([PyRunner(command=push, iterPeriod=1)] if push else []), water, PyRunner(command="record()", iterPeriod=1),
-            NewtonIntegrator(damping=0, gravity=(0, -p.gravity, 0))]
+            NewtonIntegrator(damping=0, gravity=weight)]
 
 
 def _pose_names(bodies):
@@ -91,16 +93,17 @@ class FluidWriter(FrameWriter):
 
     bodies : name -> id of a body of YADE, in the fluid or not
     bounds : ((xlo, xhi), (ylo, yhi), (zlo, zhi)), m, of the dump's box
+    within : if given, bounds of the particles that are written
     """
 
     ENERGIES = ("kinetic", "potential", "compression", "contact", "viscous", "diffusive", "boundary", "work")
     COLUMNS = "id type x y z vx vy vz radius mass density pressure"
 
-    def __init__(self, bounds, bodies=None, dump="fluid.dump", history="fluid.csv"):
+    def __init__(self, bounds, bodies=None, dump="fluid.dump", history="fluid.csv", within=None):
         bounds = [tuple(one) for one in bounds]
         if [len(one) for one in bounds] != [2, 2, 2]:
             fail(f"FluidWriter: bounds must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not {bounds}")
-        self._bodies, self._dump = dict(bodies or {}), dump
+        self._bodies, self._dump, self._within = dict(bodies or {}), dump, within
         for name, body in self._bodies.items():
             if not 0 <= body < len(O.bodies) or O.bodies[body] is None:
                 fail(f"FluidWriter: there is no body {body} for {name!r}")
@@ -112,6 +115,10 @@ class FluidWriter(FrameWriter):
     def frame(self):
         """Append a frame of the fluid."""
         rows = fluid_engine().particleRows()
+        if self._within:
+            inside = [all(low <= float(x) <= high for x, (low, high) in zip(row.split(maxsplit=5)[2:5], self._within, strict=True))
+                      for row in rows.splitlines()]
+            rows = "".join(compress(rows.splitlines(keepends=True), inside))
         with open(self._dump, "a", encoding="ascii") as file:
             file.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF ATOMS\n{rows.count(chr(10))}\nITEM: BOX BOUNDS ff ff ff\n{self._box}")
             file.write(f"ITEM: ATOMS {self.COLUMNS}\n{rows}")
@@ -150,26 +157,40 @@ class _CaseRecorder:
 
 
 class FluidRecorder(_CaseRecorder):
-    """Writes time.csv and grains.dump of a fluid in the plane when they are due.
+    """Writes time.csv and grains.dump of a fluid when they are due: in space if `p` has `low_z` and `high_z`, else in the plane.
 
-    tank: number of the wall whose force is written; None, without walls: momenta of fluid and bodies about the origin instead
+    tank: number of the wall whose force is written; None, without walls: momenta of fluid and bodies about the origin instead, in the plane
     bodies : name -> id of a free body
+    more : name -> number, or function of the positions (m) of the fluid: further columns of time.csv
+    near : bounds of the particles that are written to near.dump with each row
     """
 
-    def __init__(self, p, tank, bodies=None):
-        self._tank, self._bodies = tank, dict(bodies or {})
+    def __init__(self, p, tank, bodies=None, more=None, near=None):
+        self._tank, self._bodies, self._more = tank, dict(bodies or {}), dict(more or {})
         poses = [f"{name}_{what}" for name in self._bodies for what in ("x", "y", "vx")]
         energies = [f"{name}_energy" for name in self.ENERGIES]
-        bounds = ((p.low_x, p.high_x), (p.low_y, p.high_y), (-p.spacing, p.spacing))
-        kept = ("momentum_x", "momentum_y", "angular_momentum") if tank is None else ("tank_fx", "tank_fy")
-        super().__init__(p, bounds, [*energies, *kept, *poses])
+        space = hasattr(p, "low_z")
+        bounds = ((p.low_x, p.high_x), (p.low_y, p.high_y), (p.low_z, p.high_z) if space else (-p.spacing, p.spacing))
+        forces = ("tank_fx", "tank_fy", "tank_fz") if space else ("tank_fx", "tank_fy")
+        kept = ("momentum_x", "momentum_y", "angular_momentum") if tank is None else forces
+        super().__init__(p, bounds, [*energies, *kept, *poses, *self._more])
+        self._axes = len(forces)
+        self._near = FluidWriter(bounds, dump="near.dump", history="", within=near) if near else None
+
+    def __call__(self):
+        """Write what is due at this step."""
+        super().__call__()
+        if self._near and O.iter and O.iter % self._p.every == 0:
+            self._near.frame()
 
     def _row(self, energies):
-        kept = self._momentum() if self._tank is None else tuple(fluid_engine().wallForce(self._tank))[:2]
+        kept = self._momentum() if self._tank is None else tuple(fluid_engine().wallForce(self._tank))[:self._axes]
         row = [*(energies[name] for name in self.ENERGIES), *kept]
         for number in self._bodies.values():
             state = O.bodies[number].state
             row += [state.pos[0], state.pos[1], state.vel[0]]
+        places = fluid_engine().positions() if self._more else []
+        row += [one(places) if callable(one) else one for one in self._more.values()]
         return row
 
     def _momentum(self):
