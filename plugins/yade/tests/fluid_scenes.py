@@ -145,12 +145,17 @@ def written():
     fluid = pool((0, -G, 0), (0, 0), (0.4, 0.12), 0.3)
     body = block((0.2, 0.2, 0), 8.0, (0.01, 0.01, 0.01), plane=True)
     fluid.addBody(body, dembark.lattice((0.16, 0.16), (0.24, 0.24), DX))
-    writer = dembark.FluidWriter(((0, 0.4), (0, 0.3), (-0.01, 0.01)), {"block": body})
+    box = ((0, 0.4), (0, 0.3), (-0.01, 0.01))
+    writer = dembark.FluidWriter(box, {"block": body})
     globals()["writer"] = writer
     O.engines = [*O.engines[:-1], PyRunner(command="writer.frame(); writer.row()", iterPeriod=50, initRun=True), O.engines[-1]]
     advance(101)
-    with open("fluid.dump", encoding="ascii") as dump, open("fluid.csv", encoding="ascii") as rows:
-        return {"dump": dump.read(), "rows": rows.read(), "mass": fluid.particleMass()}
+    dembark.FluidWriter(box, dump="part.dump", history="", within=((0, 0.1), (0, 0.1), (-0.01, 0.01))).frame()
+    texts = {}
+    for kind, name in (("dump", "fluid.dump"), ("part", "part.dump"), ("rows", "fluid.csv")):
+        with open(name, encoding="ascii") as file:
+            texts[kind] = file.read()
+    return {**texts, "mass": fluid.particleMass()}
 
 
 def wrong_writers():
@@ -158,7 +163,7 @@ def wrong_writers():
     begin((0, 0, 0))
     box = ((0, 1), (0, 1), (0, 1))
     return [refusal(lambda words=words: dembark.FluidWriter(*words)) for words in (
-        (((0, 0, 0), (1, 1, 1)),), (box, {"block": 99}), (box, {"block": -1}))]
+        (((0, 0, 0), (1, 1, 1)),), (box, {}, "", "", ((0, 1), (0, 1))), (box, {"block": 99}), (box, {"block": -1}))]
 
 
 def moved_out_of_the_water():

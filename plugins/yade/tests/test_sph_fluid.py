@@ -101,6 +101,9 @@ def test_frames_and_rows_can_be_read(found, tmp_path):
     frame = frames[2]
     assert len(frame.ids) == 120 and (frame.masses == pytest.approx(found["written"]["mass"]))
     assert frame.extra["density"].min() > 990.0 and frame.extra["pressure"].max() == pytest.approx(1000.0 * G * 0.11, rel=0.2)
+    (tmp_path / "part.dump").write_text(found["written"]["part"])
+    (part,) = GrainsDump(tmp_path / "part.dump")
+    assert (part.positions[:, :2] <= 0.1).all() and 20 <= len(part.ids) < 120
     header, *rows = found["written"]["rows"].splitlines()
     assert header.split(",")[:4] == ["step", "time", "block_x", "block_y"] and header.split(",")[-1] == "work"
     assert [row.split(",")[0] for row in rows] == ["0", "50", "100"]
@@ -138,6 +141,7 @@ def test_a_body_that_was_in_the_way_can_be_moved(found):
 
 
 def test_a_writer_says_what_is_no_box_and_no_body(found):
-    box, *bodies = found["wrong_writers"]
+    box, within, *bodies = found["wrong_writers"]
+    assert within == "dembark: FluidWriter: within must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not [(0, 1), (0, 1)]"
     assert box.startswith("dembark: FluidWriter: bounds must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not [(0, 0, 0)")
     assert bodies == [f"dembark: FluidWriter: there is no body {body} for 'block'" for body in (99, -1)]

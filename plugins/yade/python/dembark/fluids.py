@@ -93,16 +93,17 @@ class FluidWriter(FrameWriter):
 
     bodies : name -> id of a body of YADE, in the fluid or not
     bounds : ((xlo, xhi), (ylo, yhi), (zlo, zhi)), m, of the dump's box
-    within : if given, bounds of the particles that are written
+    within : if given, bounds (m) of the particles that frames have
     """
 
     ENERGIES = ("kinetic", "potential", "compression", "contact", "viscous", "diffusive", "boundary", "work")
     COLUMNS = "id type x y z vx vy vz radius mass density pressure"
 
     def __init__(self, bounds, bodies=None, dump="fluid.dump", history="fluid.csv", within=None):
-        bounds = [tuple(one) for one in bounds]
-        if [len(one) for one in bounds] != [2, 2, 2]:
-            fail(f"FluidWriter: bounds must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not {bounds}")
+        bounds, within = ([tuple(one) for one in given or ()] for given in (bounds, within))
+        for name, pairs in (("bounds", bounds), ("within", within or bounds)):
+            if [len(one) for one in pairs] != [2, 2, 2]:
+                fail(f"FluidWriter: {name} must be ((xlo, xhi), (ylo, yhi), (zlo, zhi)) (m), not {pairs}")
         self._bodies, self._dump, self._within = dict(bodies or {}), dump, within
         for name, body in self._bodies.items():
             if not 0 <= body < len(O.bodies) or O.bodies[body] is None:
