@@ -18,6 +18,9 @@ from dembark.input_decks.dam_break.water import pressure
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc import GrainsDump, read_times
 from dembark.postproc.tests.packings import frame_of
+from dembark.validation.case.deck import prepare
+from dembark.validation.case.folders import find
+from dembark.validation.case.resolve import resolve
 
 dam = module("dam_break_box")
 DRY, WALL = 0.2, (0.003, 0.015, 0.03, 0.08)
@@ -159,6 +162,15 @@ STILL = {"scene": "wall", "resolution": 10, "column_length": 0.3, "column_depth"
 def test_sensors_that_a_small_box_would_not_carry_are_left_out() -> None:
     assert set(dam.sensors("box", 1.0, 0.161, 0.161)) == {f"P{k}" for k in range(1, 9)}
     assert set(dam.sensors("box", 1.0, 0.11, 0.08)) == {"P1", "P2", "P3", "P5", "P6"}
+
+
+@pytest.mark.parametrize("resolution", [5, 10, 14, 20, 28])
+def test_the_top_of_the_box_keeps_its_height_at_any_spacing(resolution: int) -> None:
+    """P4 is 20 mm below it."""
+    case = find("dam_break_box")
+    d = prepare(case, resolve(case, None, None, {"resolution": resolution})).numbers
+    layers = (d["box_z"] - d["box_foot"]) / d["spacing"]
+    assert d["box_z"] == 0.161 and layers == pytest.approx(round(layers)) and abs(d["box_foot"]) <= 0.5 * d["spacing"]
 
 
 def test_sensors_show_still_water_in_an_engine(simulate: Any) -> None:
