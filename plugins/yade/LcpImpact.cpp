@@ -154,7 +154,7 @@ void LcpImpact::addShape(const Body& body, const impact::Wall& wall, std::vector
 	if (body.isDynamic()) fail(where + ": body " + id + " can move freely; hold it by blockedDOFs = 'xyzXYZ'");
 	if (const auto* flat = dynamic_cast<const Wall*>(body.shape.get())) {
 		const Vector3r normal = Vector3r::Unit(flat->axis) * (flat->sense < 0 ? -1.0 : 1.0);
-		around.planes.push_back({wall, vec(state.pos), vec(normal), vec(state.vel), flat->sense == 0});
+		around.planes.push_back({wall, vec(state.pos), vec(normal), vec(state.vel), 0.0, flat->sense == 0});
 	} else if (const auto* round = dynamic_cast<const CylinderWall*>(body.shape.get())) {
 		const double omega = state.angVel.dot(round->axis);  // its surface moves along itself
 		if (!(round->radius > 0.0)) fail(where + ": CylinderWall.radius of body " + id + " is not set; give it in m");

@@ -103,6 +103,9 @@ def wall():
             assert total == engine.walls[0].force[1], (kind, total)
         found[kind] = {"velocity": O.bodies[len(bodies)].state.vel[1], "force": least, "peak": speed * math.sqrt(k * mass),
                        "outputs": outputs(engine)}
+    setting([floor(sense=0), log((0, -0.1, 0), 0.1, mass, (0, speed, 0))], dt, stiffness=s, walls=[dict(bodies=[0], stiffness=local)])
+    advance(4000)
+    found["from below"] = O.bodies[1].state.vel[1]
     engine = setting([floor(), log((0, 0.1, 0), 0.1, mass)], dt, stiffness=s, walls=[dict(bodies=[0], stiffness=local)])
     O.bodies[0].state.vel = (0, speed, 0)
     advance(4000)

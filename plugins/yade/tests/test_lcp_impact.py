@@ -73,6 +73,7 @@ def test_wall_of_local_stiffness(found, kind):
 def test_kinds_of_walls_agree(found):
     velocities = [found["wall"][kind]["velocity"] for kind in ("wall", "two sides", "facets", "drum")]
     assert velocities == pytest.approx([velocities[0]] * 4, rel=1e-11)
+    assert found["wall"]["from below"] == pytest.approx(-velocities[0], rel=1e-11)
 
 
 def test_moving_wall_and_moving_held_log_give_twice_their_speed(found):
