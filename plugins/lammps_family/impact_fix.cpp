@@ -30,9 +30,14 @@ ImpactFix::ImpactFix(LAMMPS* lmp, int narg, char** arg, const char* mesh) : Shar
   local_freq = peratom_freq = 1;  // LIGGGHTS's compute reduce divides by that of atoms for a local array too
   // One row, so that a dump of a run without any contact finds an array.
   memory->create(array_local, local_capacity_, local_columns, "lcp/impact:array_local");
+  peratom_flag = impacts_->command.has_lengths();
+  size_peratom_cols = atom_columns;
 }
 
-ImpactFix::~ImpactFix() { memory->destroy(array_local); }
+ImpactFix::~ImpactFix() {
+  memory->destroy(array_local);
+  memory->destroy(array_atom);
+}
 
 /// Runs `work` on the rank that knows all bodies; its report is that of all. What goes wrong there ends the run with its line. Collective.
 void ImpactFix::on_first(const std::function<void()>& work) {
@@ -45,11 +50,13 @@ void ImpactFix::init() {
   only_coherent_units();
   if (domain->triclinic) fail("a triclinic box is not supported; use an orthogonal one");
   only_single_grains("it knows");
+  if (impacts_->command.has_lengths() && domain->dimension == 2)
+    fail("logs with a length move in space; use dimension 3, or without length and logs the model of the cross-section");
   check_order();
   torque_scale_ = find_torque_scale();
   find_walls();
   reset_dt();
-  on_first([this] { impacts_->open_file(); });
+  on_first([this] { impacts_->open_files(); });
 }
 
 void ImpactFix::reset_dt() {
@@ -118,13 +125,31 @@ void ImpactFix::do_step(double dt, const std::function<void()>& work) {
     take_walls(dt);
     impacts_->take(all_body_, box());
     work();
-    impacts_->hand_out(all_wrench_);
+    impacts_->hand_out(all_update_);
   });
-  own_wrench_.resize(own_atom_.size());
-  ranks_.scatter(all_wrench_, own_wrench_);
+  own_update_.resize(own_atom_.size());
+  ranks_.scatter(all_update_, own_update_);
+  update_atoms();
+}
+
+/// Forces, spins and the array of atoms. The engine's torques turn a log with a length as they would a sphere, and its axis not at all.
+void ImpactFix::update_atoms() {
+  if (peratom_flag && atom->nmax > atom_capacity_) {
+    atom_capacity_ = atom->nmax;
+    memory->destroy(array_atom);
+    memory->create(array_atom, atom_capacity_, atom_columns, "lcp/impact:array_atom");
+  }
+  for (int i = 0; peratom_flag && i < atom->nlocal; ++i) std::fill_n(array_atom[i], int(atom_columns), 0.0);
   for (std::size_t k = 0; k < own_atom_.size(); ++k) {
-    add(atom->f[own_atom_[k]], own_wrench_[k].force);
-    add(atom->torque[own_atom_[k]], own_wrench_[k].torque, 1.0 / torque_scale_);
+    const int i = own_atom_[k];
+    const BodyUpdate& update = own_update_[k];
+    add(atom->f[i], update.force);
+    add(atom->torque[i], update.torque, 1.0 / torque_scale_);
+    if (!peratom_flag) continue;
+    std::fill_n(atom->omega[i], 3, 0.0);
+    add(atom->omega[i], update.spin);
+    const auto row = table_row(update.attitude);
+    std::copy(row.begin(), row.end(), array_atom[i]);
   }
 }
 
@@ -180,7 +205,9 @@ void ImpactFix::fill_local() {
 
 double ImpactFix::compute_vector(int k) { return dembark::to_numbers(impacts_->report)[std::size_t(k)]; }
 
-double ImpactFix::memory_usage() { return impacts_->memory() + double(local_capacity_) * local_columns * sizeof(double); }
+double ImpactFix::memory_usage() {
+  return impacts_->memory() + double(local_capacity_ * local_columns + atom_capacity_ * atom_columns) * sizeof(double);
+}
 
 void ImpactFix::write_restart(FILE* file) {
   keep_end_of_step();

@@ -36,7 +36,7 @@ class ImpactFix : public SharedFix {
   FirstRank ranks_;
 
  private:
-  static constexpr int local_columns = 13;
+  static constexpr int local_columns = 13, atom_columns = 8;
 
   /// What the engine's own walls are to have before a run; then, in each step, what of them all ranks send to the first (collective), and
   /// what the first takes over. `dt` (s): time since the last call, or 0 if there is none.
@@ -50,15 +50,16 @@ class ImpactFix : public SharedFix {
   dembark::impact::PeriodicBox box() const;
   void gather_atoms();
   void do_step(double dt, const std::function<void()>& work);
+  void update_atoms();
   bool local_is_read() const;
   void fill_local();
   void keep_end_of_step();
 
   std::vector<int> own_atom_;  // of each own body, in the order in which they are gathered
   std::vector<dembark::impact::Body> own_body_, all_body_;
-  std::vector<dembark::impact::ContactWrench> own_wrench_, all_wrench_;
+  std::vector<dembark::impact::BodyUpdate> own_update_, all_update_;
   double torque_scale_ = 1.0;  // the engine turns atoms with an inertia of its own
-  int local_capacity_ = 1;
+  int local_capacity_ = 1, atom_capacity_ = 0;
 };
 
 }  // namespace dembark_family

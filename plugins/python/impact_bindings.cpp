@@ -50,7 +50,7 @@ void sample(Scene& scene, const StepReport& r, const std::vector<std::int64_t>& 
   for (const Body& b : scene.bodies()) append(h.position, b.position);
   for (const auto& v : scene.velocity()) append(h.velocity, v);
   for (const auto& w : scene.spin()) append(h.spin, w);
-  for (const Quaternion& q : scene.orientation()) append(h.orientation, to_numbers(q));
+  for (const Attitude& a : scene.attitudes()) append(h.orientation, to_numbers(a.orientation));
   append(h.report, to_numbers(r));
   h.report.push_back(scene.kinetic_energy_of_half_step());
   const auto& contacts = scene.system().contacts();
@@ -108,7 +108,7 @@ void bind_impact(nb::module_& m) {
                if (i < steps) scene.advance();
                if (i % 4096 == 4095 && PyErr_CheckSignals() != 0) throw nb::python_error();
              }
-             const std::size_t samples = h.time.size(), n = scene.bodies().size(), oriented = scene.orientation().size();
+             const std::size_t samples = h.time.size(), n = scene.bodies().size(), oriented = scene.attitudes().size();
              return nb::make_tuple(numpy(h.time, {samples}), numpy(h.position, {samples, n, 3}), numpy(h.velocity, {samples, n, 3}),
                                    numpy(h.spin, {samples, n, 3}), numpy(h.orientation, {samples, oriented, 4}),
                                    numpy(h.report, {samples, 14}), numpy(h.column, {samples, left.size()}), table(impacts, 17));

@@ -25,11 +25,17 @@ struct Command {
   std::size_t types = 0;
   bool solid_cylinder = true;  ///< moment of inertia m r^2 / 2, else 2/5 m r^2
   std::string impacts_file;    ///< empty: none
+  // Of logs with a length; without both there are none.
+  std::vector<double> lengths;  ///< m, of logs of each type that are not in the list
+  Vec3<double> axis{};          ///< their direction at the start
+  std::string logs_file;        ///< list of logs with lengths and directions of their own (log_list.hpp)
 
+  bool has_lengths() const { return !lengths.empty() || !logs_file.empty(); }
+  /// kg m^2, of logs without a length
   double inertia(double mass, double radius) const {
     return solid_cylinder ? cylinder_inertia(mass, radius) : sphere_inertia(mass, radius);
   }
-  /// An engine that turns bodies with an inertia of `own` m r^2 does with a torque times this number what the torque does to a log.
+  /// An engine that turns bodies with an inertia of `own` m r^2 does with a torque times this number what the torque does to such a log.
   double torque_scale(double own) const { return inertia(1.0, 1.0) / own; }
 };
 
@@ -46,6 +52,7 @@ class CommandReader : keywords::Reader {
   Command read() {
     while (left()) keyword(word("lcp/impact", "a keyword"));
     if (stiffness_.empty()) refuse("stiffness is missing: one value (N/m) for each atom type");
+    check_lengths();
     damping_.resize(stiffness_.size());
     Settings& s = command_.settings;
     s.materials.clear();
@@ -58,6 +65,7 @@ class CommandReader : keywords::Reader {
 
  private:
   using Friction = FinnieRabinowicz;
+  static constexpr double Vec3<double>::* axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
 
   void keyword(const std::string& of) {
     Settings& settings = command_.settings;
@@ -73,7 +81,14 @@ class CommandReader : keywords::Reader {
       if (next_is_number()) law_.contact_area = positive(of, "the contact area (m^2)");
     } else if (of == "tangential_ratio") law_.tangential_stiffness_ratio = positive(of, "the value");
     else if (of == "wall") wall();
-    else if (of == "inertia") command_.solid_cylinder = choice(of, "the shape", {"cylinder", "sphere"}) == 0;
+    else if (of == "inertia") {
+      command_.solid_cylinder = choice(of, "the shape", {"cylinder", "sphere"}) == 0;
+      inertia_given_ = true;
+    } else if (of == "length") command_.lengths = per_type(of, "m", true);
+    else if (of == "axis") {
+      for (double* const part : {&command_.axis.x, &command_.axis.y, &command_.axis.z}) *part = number(of, "the direction X Y Z");
+      if (norm(command_.axis) == 0.0) refuse("axis: the direction must not be zero");
+    } else if (of == "logs") command_.logs_file = word(of, "the name of the file");
     else if (of == "impacts") command_.impacts_file = word(of, "the name of the file");
     else if (of == "method") {
       const std::vector<std::string> methods(std::begin(lcp_method_names), std::end(lcp_method_names));
@@ -85,7 +100,19 @@ class CommandReader : keywords::Reader {
     } else
       refuse("'" + of +
              "' is no keyword; there is stiffness, damping, contact_damping, theta, friction, shear_strength, tangential_ratio, wall, "
-             "inertia, impacts, method, sweeps");
+             "inertia, length, axis, logs, impacts, method, sweeps");
+  }
+
+  void check_lengths() {
+    const bool directed = norm(command_.axis) > 0.0;
+    if (!command_.lengths.empty() && !directed) refuse("length: axis is missing, the direction X Y Z of the logs at the start");
+    if (directed && command_.lengths.empty()) refuse("axis: length is missing, one value (m) for each atom type");
+    if (!command_.has_lengths()) return;
+    if (inertia_given_) refuse("inertia is that of logs in cross-section; with length or logs it follows from the shape of the logs");
+    if (!command_.meshes.empty())
+      refuse("wall " + command_.walls[std::size_t(wall_number(command_.around.meshes[0].id))] +
+             ": a mesh is for logs in cross-section; with length or logs use planes and cylinders");
+    command_.solid_cylinder = false;  // what the engine turns with
   }
 
   ImpactPairLaw law(const Friction& friction) const {
@@ -125,8 +152,21 @@ class CommandReader : keywords::Reader {
 
   int axis(const std::string& of) { return choice(of, "the axis", {"x", "y", "z"}); }
 
+  /// The two coordinates across axis k, in the order x, y, z.
+  void across(const std::string& of, int k, Vec3<double>& point) {
+    point.*axes[k == 0 ? 1 : 0] = number(of, "the first coordinate (m) of the axis");
+    point.*axes[k == 2 ? 1 : 2] = number(of, "the second coordinate (m) of the axis");
+  }
+
+  /// About the coordinate axis that the plane is normal to; right-handed about it on both sides.
+  void turn(const std::string& of, double omega, Plane& plane) {
+    int k = 0;
+    while (plane.normal.*axes[k] == 0.0) ++k;
+    across(of + ": omega", k, plane.point);
+    plane.omega = omega * plane.normal.*axes[k];
+  }
+
   void wall() {
-    static double Vec3<double>::* const axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
     std::vector<std::string> shapes = {"plane", "cylinder"};
     if (mesh_) shapes.emplace_back("mesh");
     const int shape = choice("wall", "the shape", shapes);
@@ -148,8 +188,7 @@ class CommandReader : keywords::Reader {
       const int k = axis(of);
       drum.axis = {};
       drum.axis.*axes[k] = 1.0;
-      drum.point.*axes[k == 0 ? 1 : 0] = number(of, "the first coordinate (m) of the axis");
-      drum.point.*axes[k == 2 ? 1 : 2] = number(of, "the second coordinate (m) of the axis");
+      across(of, k, drum.point);
       drum.radius = positive(of, "the radius (m)");
       wall = &drum;
     } else {
@@ -168,8 +207,10 @@ class CommandReader : keywords::Reader {
       } else if (key == "friction") {
         own = friction(of + ": friction");
       } else {
-        if (shape != 1) refuse(of + ": omega is for cylinders");
-        around.drums.back().omega = number(of, "omega (rad/s)");
+        if (shape == 2) refuse(of + ": omega is for cylinders and planes");
+        const double omega = number(of, "omega (rad/s)");
+        if (shape == 1) around.drums.back().omega = omega;
+        else turn(of, omega, around.planes.back());
       }
     }
     if (!(wall->stiffness > 0.0)) refuse(of + ": stiffness (N/m) is missing");
@@ -183,7 +224,8 @@ class CommandReader : keywords::Reader {
   std::vector<double> stiffness_, damping_;
   ImpactPairLaw law_;  ///< but for its friction
   Friction friction_ = no_friction();
-  double strength_ = unlimited_strength;                               ///< Pa
+  double strength_ = unlimited_strength;  ///< Pa
+  bool inertia_given_ = false;
   std::vector<std::pair<double, std::optional<Friction>>> wall_laws_;  ///< stiffness, N/m, and friction; none: that of the fix
 };
 

@@ -37,6 +37,13 @@ inline Quaternion normalised(const Quaternion& q) {
   return {part * q.w, part * q.x, part * q.y, part * q.z};
 }
 
+/// The shortest turn from z to `axis`, which is not zero; half a turn is one about x.
+inline Quaternion rotation_to(const Vec3<double>& axis) {
+  const Vec3<double> u = axis * (1.0 / norm(axis));
+  // Twice the turn to the middle between both.
+  return 1.0 + u.z > 1e-14 ? normalised({1.0 + u.z, -u.y, u.x, 0.0}) : Quaternion{0.0, 1.0, 0.0, 0.0};
+}
+
 /// Of a body with a moment of inertia `axial` about its axis u (unit) and `across` at right angles to it (kg m^2).
 struct SymmetricInertia {
   double axial, across;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "attitude.hpp"
 #include "geometry.hpp"
 #include "start.hpp"
 #include "system.hpp"
@@ -33,9 +34,8 @@ class Scene {
     for (Capsule& c : capsules) {
       c.begin();
       bodies_.push_back(c);
-      length_.push_back(c.length);
-      orientation_.push_back(normalised(c.orientation));
-      momentum_.push_back(std::isinf(c.inertia) ? Vec3<double>() : inertia(c).momentum(c.spin, axis(c)));
+      attitudes_.push_back({c.length, normalised(c.orientation), {}});
+      attitudes_.back().begin(c);
     }
     velocity_.resize(bodies_.size());
     spin_.resize(bodies_.size());
@@ -51,7 +51,7 @@ class Scene {
   const std::vector<Vec3<double>>& velocity() const { return velocity_; }
   const std::vector<Vec3<double>>& spin() const { return spin_; }
   /// Of the moment; empty where the bodies have none.
-  const std::vector<Quaternion>& orientation() const { return orientation_; }
+  const std::vector<Attitude>& attitudes() const { return attitudes_; }
 
   /// One line where bodies overlap now by more than a start may, else nothing.
   std::string start_error() {
@@ -75,7 +75,7 @@ class Scene {
       spin_[i] = b.spin;
       if (count_ == 0) continue;
       velocity_[i] += (0.5 * dt / b.mass) * (b.force + system_.wrenches()[i].force);
-      spin_[i] += kicked(i, 0.5 * dt);
+      spin_[i] += kicked(b, b.torque + system_.wrenches()[i].torque, 0.5 * dt);
     }
     return report;
   }
@@ -87,8 +87,13 @@ class Scene {
       Body& b = bodies_[i];
       b.velocity += (kick / b.mass) * (b.force + system_.wrenches()[i].force);
       b.position += dt * b.velocity;
-      if (orientation_.empty()) b.spin += kicked(i, kick);
-      else rotate(i, kick, dt);
+      const Vec3<double> torque = b.torque + system_.wrenches()[i].torque;
+      if (attitudes_.empty()) {
+        b.spin += kicked(b, torque, kick);
+        continue;
+      }
+      if (!std::isinf(b.inertia)) attitudes_[i].momentum += kick * torque;
+      attitudes_[i].turn(b, dt);
     }
     for (Plane& p : around.planes) p.point += dt * p.velocity;
     for (Drum& d : around.drums) d.point += dt * d.velocity;
@@ -109,7 +114,7 @@ class Scene {
     for (const Body& b : bodies_) {
       if (!std::isinf(b.mass)) sum += 0.5 * b.mass * dot(b.velocity, b.velocity);
       if (std::isinf(b.inertia)) continue;
-      sum += orientation_.empty() ? 0.5 * b.inertia * dot(b.spin, b.spin) : inertia(b).energy(b.spin, axis(b));
+      sum += attitudes_.empty() ? 0.5 * b.inertia * dot(b.spin, b.spin) : inertia_of(b).energy(b.spin, axis_of(b));
     }
     return sum;
   }
@@ -141,43 +146,14 @@ class Scene {
     around.find(inside_, far, contacts);
   }
 
-  /// Of a capsule, unit; of one without a length any will do.
-  static Vec3<double> axis(const Body& b) {
-    const double half = norm(b.half_axis);
-    return half > 0.0 ? b.half_axis * (1.0 / half) : Vec3<double>{0.0, 0.0, 1.0};
-  }
-  static SymmetricInertia inertia(const Body& b) { return {has_length(b) ? b.axial_inertia : b.inertia, b.inertia}; }
-  void point_axis(std::size_t i) { bodies_[i].half_axis = (0.5 * length_[i]) * orientation_[i].turned({0.0, 0.0, 1.0}); }
-
-  /// Change of spin (rad/s) by all torques in a stretch of time (s).
-  Vec3<double> kicked(std::size_t i, double stretch) const {
-    const Body& b = bodies_[i];
-    const Vec3<double> torque = b.torque + system_.wrenches()[i].torque;
-    if (!has_length(b) || std::isinf(b.inertia)) return (stretch / b.inertia) * torque;
-    return stretch * inertia(b).spin(torque, axis(b));
-  }
-
-  /// A kick (s) of the torques, and free rotation for dt (s). The angular momentum is what is kept, to the last digit.
-  void rotate(std::size_t i, double kick, double dt) {
-    Body& b = bodies_[i];
-    if (std::isinf(b.inertia)) {
-      orientation_[i] = normalised(rotation_by(dt * b.spin) * orientation_[i]);
-      return point_axis(i);
-    }
-    momentum_[i] += kick * (b.torque + system_.wrenches()[i].torque);
-    orientation_[i] = rotated_freely(inertia(b), dt, momentum_[i], orientation_[i]);
-    point_axis(i);
-    b.spin = inertia(b).spin(momentum_[i], axis(b));
-  }
-
   void archive(Archive& a) {
     std::vector<double> system = system_.state();
     a(system), a(count_);
     if (a.reading()) system_.restore(system);
     for (Body& b : bodies_) a(b.position), a(b.velocity), a(b.spin);
-    for (std::size_t i = 0; i < orientation_.size(); ++i) {
-      a(orientation_[i]), a(momentum_[i]);
-      point_axis(i);
+    for (std::size_t i = 0; i < attitudes_.size(); ++i) {
+      a(attitudes_[i].orientation), a(attitudes_[i].momentum);
+      attitudes_[i].lay(bodies_[i]);
     }
     for (Plane& p : around.planes) a(p.point);
     for (Drum& d : around.drums) a(d.point);
@@ -199,10 +175,8 @@ class Scene {
   System system_;
   std::vector<Body> bodies_;
   std::vector<Vec3<double>> velocity_, spin_;
-  std::vector<Body> inside_;             ///< see find()
-  std::vector<double> length_;           ///< m, of capsules
-  std::vector<Quaternion> orientation_;  ///< likewise
-  std::vector<Vec3<double>> momentum_;   ///< kg m^2/s, likewise, of rotation
+  std::vector<Body> inside_;         ///< see find()
+  std::vector<Attitude> attitudes_;  ///< of capsules
   std::int64_t count_ = 0;
 };
 

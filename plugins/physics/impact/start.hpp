@@ -43,16 +43,22 @@ inline std::string start_error(const std::vector<Body>& bodies, const std::vecto
          " of the radius; at most " + number_text(most_overlap) + " is allowed";
 }
 
-/// The largest omega = sqrt(k / m*) (rad/s) of the contacts that are possible: of the lightest discs or balls of each material with each
-/// other and with the walls. 0 where nothing can meet.
+/// kg, of a body as a contact feels it; of a capsule at its end, where it is least.
+inline double least_mass(const Body& b) {
+  return has_length(b) ? 1.0 / (1.0 / b.mass + dot(b.half_axis, b.half_axis) / b.inertia) : b.mass;
+}
+
+/// The largest omega = sqrt(k / m*) (rad/s) of the contacts that are possible: of the lightest bodies of each material with each other and
+/// with the walls. 0 where nothing can meet.
 inline double stiffest_contact(const Settings& settings, const std::vector<Body>& bodies, const ContactGeometry& around) {
   constexpr double none = std::numeric_limits<double>::infinity();
   const std::size_t n = settings.materials.size();
   std::vector<std::array<double, 2>> lightest(n, {none, none});  // kg
   for (const Body& b : bodies) {
     auto& [first, second] = lightest[std::size_t(b.material)];
-    second = std::min(second, std::max(first, b.mass));
-    first = std::min(first, b.mass);
+    const double mass = least_mass(b);
+    second = std::min(second, std::max(first, mass));
+    first = std::min(first, mass);
   }
   double square = 0.0;
   const auto meet = [&](double stiffness, double other, double inverse_mass) {

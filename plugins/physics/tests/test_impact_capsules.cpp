@@ -1,10 +1,14 @@
 // Capsules: where they touch, how they are found, and that the rows of a step are those of their motion.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <fstream>
 #include <random>
+#include <string>
 #include <vector>
 #include "catch.hpp"
 
+#include "dembark/impact/log_list.hpp"
 #include "impact_scenes.hpp"
 
 using namespace dembark;
@@ -266,4 +270,32 @@ TEST_CASE("bad capsules and contacts: one line that says what is wrong") {
   CHECK_THROWS_WITH(step(system, bodies, contacts, 0, 1, force, torque), Catch::Contains("share of the stiffness must be > 0 and <= 1"));
   bodies[0].axial_inertia = 0.0;
   CHECK_THROWS_WITH(step(system, bodies, {}, 0, 1, force, torque), Catch::Contains("body 0: inertia about the axis must be > 0 kg m^2"));
+}
+
+TEST_CASE("the turn to an axis is the shortest one") {
+  for (const Vec3<double> axis : {Vec3<double>{0, 0, 2}, Vec3<double>{0, 0, -3}, Vec3<double>{1, -2, 0.5}, Vec3<double>{1e-9, 0, -1}}) {
+    const Quaternion q = rotation_to(axis);
+    CHECK(norm(q.turned({0, 0, 1}) - axis * (1.0 / norm(axis))) < 1e-7);
+    CHECK(q.z == 0.0);  // the axis of the turn lies across z
+  }
+}
+
+TEST_CASE("a list of logs is read line by line, or refused with the line that is wrong") {
+  const std::string path = "list_of_logs.txt";
+  const auto read = [&](const std::string& text) {
+    std::ofstream(path) << text;
+    return read_logs(path);
+  };
+  const auto found = read("# id length x y z\n7 1.5 0 0 -2  # upside down\n\n  3 0 1 1 0\n");
+  REQUIRE(found.size() == 2);
+  CHECK(found.at(7).length == 1.5);
+  CHECK(norm(found.at(7).orientation.turned({0, 0, 1}) - Vec3<double>{0, 0, -1}) == 0.0);
+  CHECK(found.at(3).length == 0.0);
+  CHECK_THROWS_WITH(read("1 1 0 0 1\n2 -1 0 0 1"), Catch::Contains("line 2: the length (m) must be >= 0, not -1"));
+  CHECK_THROWS_WITH(read("1 1 0 0 0"), Catch::Contains("line 1: the direction of the log must not be zero"));
+  for (const char* const wrong : {"1 1 0 0", "1 1 0 0 1 2", "1 long 0 0 1", "1.5 1 0 0 1", "1 nan 0 0 1"})
+    CHECK_THROWS_WITH(read(wrong), Catch::Contains("line 1: it must have five numbers"));
+  CHECK_THROWS_WITH(read("1 1 0 0 1\n1 1 0 0 1"), Catch::Contains("line 2: atom 1 has a line already"));
+  std::remove(path.c_str());
+  CHECK_THROWS_WITH(read_logs(path), Catch::Contains("file list_of_logs.txt cannot be read"));
 }

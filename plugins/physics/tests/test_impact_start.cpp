@@ -102,6 +102,17 @@ TEST_CASE("the stiffest contact is that of the lightest logs that can meet") {
   CHECK_THAT(stiffest_contact(s, {log(1, 20, 0.0)}, around), WithinRel(std::sqrt(1e7 / 20), 1e-14));
 }
 
+TEST_CASE("the end of a log with a length is lighter than the log") {
+  Body slender = log(1, 40, 0.0);
+  slender.half_axis = {0.0, 0.3, 0.4};
+  slender.inertia = slender.axial_inertia = 40.0 / 12.0;  // of a rod of 1 m: an end feels a quarter of the mass
+  ContactGeometry around;
+  around.planes = {Plane()};
+  CHECK_THAT(stiffest_contact(softer_and_harder(), {slender}, around), WithinRel(std::sqrt(1e7 / 10), 1e-14));
+  slender.mass = slender.inertia = slender.axial_inertia = INFINITY;
+  CHECK(stiffest_contact(softer_and_harder(), {slender}, around) == 0.0);
+}
+
 TEST_CASE("a time step beyond 1 / omega is warned of") {
   Settings s = softer_and_harder();
   const std::vector<Body> logs = {log(1, 50, 0.0), log(2, 50, 1.0)};  // omega = 447.2 rad/s

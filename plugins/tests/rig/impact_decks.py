@@ -19,11 +19,12 @@ DRIVERS = {"liggghts": liggghts_driver, "lammps": lammps_driver}
 ATOMS = {"liggghts": "granular", "lammps": "sphere"}
 GHOSTS = {"liggghts": "communicate single vel yes", "lammps": "comm_modify vel yes"}
 FORMAT = {"liggghts": "format", "lammps": "format line"}
-SPIN = {"liggghts": "omegaz {!r}", "lammps": "omega 0 0 {!r}"}
+SPIN = {"liggghts": "omegax {!r} omegay {!r} omegaz {!r}", "lammps": "omega {!r} {!r} {!r}"}
 
 # Names of what the fix returns as a vector, in its order.
 VECTOR = ("contacts", "active", "impacts", "peak", "impulse", "dissipated", "elastic", "pivots", "block_steps", "pivots_total",
           "certificate", "worst_certificate", "peak_so_far")
+ATTITUDE = " ".join(f"f_hits[{i}]" for i in range(1, 9))  # of logs with a length: length, axis, quaternion
 STATE = "id x y z vx vy vz omegax omegay omegaz fx fy fz tqx tqy tqz"
 GROUND = ("wall plane ground y 0 lo stiffness 5e7 friction 0.3 wall plane left x -0.9 lo stiffness 5e7 "
           "wall plane right x 0.9 hi stiffness 5e7")
@@ -32,15 +33,21 @@ LOCAL = ("id_a", "id_b", "nx", "ny", "nz", "gap", "normal_force", "tx", "ty", "t
 
 @dataclass(frozen=True)
 class Log:
-    """A log in cross-section: m, m/s, kg, rad/s."""
+    """A log in cross-section, or with a length in space: m, m/s, kg, rad/s."""
 
     position: tuple[float, float]
-    velocity: tuple[float, float] = (0.0, 0.0)
+    velocity: tuple[float, ...] = (0.0, 0.0)
     radius: float = 0.1
     mass: float = 50.0
-    spin: float = 0.0
+    spin: float | tuple[float, float, float] = 0.0
     type: int = 1
     z: float = 0.0
+    length: float | None = None  # a line of the list of logs, with the axis
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    @property
+    def spins(self) -> tuple[float, float, float]:
+        return self.spin if isinstance(self.spin, tuple) else (0.0, 0.0, self.spin)
 
 
 @dataclass
@@ -63,15 +70,25 @@ class Case:
     local: str = ""  # a dump of the contacts with a force, each time that the logs are dumped
     motion: str = "nve/sphere"
 
+    @property
+    def in_space(self) -> bool:
+        return any(word in self.words.split() for word in ("length", "logs"))
+
+    def logs_file(self) -> str:
+        """The list of logs with a length of their own."""
+        return "# id length x y z\n" + "".join(f"{number} {log.length!r} {log.axis[0]!r} {log.axis[1]!r} {log.axis[2]!r}\n"
+                                               for number, log in enumerate(self.logs, 1) if log.length is not None)
+
     def head(self, engine: str = "liggghts") -> str:
         """The part of the deck that a run from a restart file does not need."""
         lines = [f"region domain block {' '.join(repr(b) for b in self.box)} units box", f"create_box {self.types} domain"]
         lines += [f"create_atoms {log.type} single {log.position[0]!r} {log.position[1]!r} {log.z!r} units box" for log in self.logs]
         for number, log in enumerate(self.logs, 1):
-            lines.append(f"set atom {number} diameter {2.0 * log.radius!r} vx {log.velocity[0]!r} vy {log.velocity[1]!r}")
+            velocity = " ".join(f"v{axis} {v!r}" for axis, v in zip("xyz", log.velocity, strict=False))
+            lines.append(f"set atom {number} diameter {2.0 * log.radius!r} {velocity}")
             lines.append(f"set atom {number} mass {log.mass!r}")
-            if log.spin:
-                lines.append(f"set atom {number} {SPIN[engine].format(log.spin)}")
+            if any(log.spins):
+                lines.append(f"set atom {number} {SPIN[engine].format(*log.spins)}")
         return "\n".join(lines)
 
     def text(self, engine: str = "liggghts", *, head: str | None = None, run: str | None = None, ranks: int = 1,
@@ -79,19 +96,24 @@ class Case:
         gravity = f"fix weight all gravity {self.gravity!r} vector 0 -1 0" if self.gravity else ""
         local = f"dump local all local {self.every} {self.local} " + " ".join(f"f_hits[{i}]" for i in range(1, 14))
         line = FORMAT[engine]
+        atoms = f"{STATE} {ATTITUDE}" if self.in_space else STATE
         return "\n".join([
             f"log {log_name(dump)}", "units si", f"dimension {self.dimension}", f"atom_style {ATOMS[engine]}",
             "atom_modify map array sort 0 0.0", f"boundary {self.boundary}", "newton off", GHOSTS[engine], f"processors {ranks} 1 1",
             self.head(engine) if head is None else head, "neighbor 0.05 bin", "neigh_modify delay 0", self.before, gravity,
             f"fix hits all lcp/impact {self.words}", self.after, f"fix motion all {self.motion}", f"timestep {self.time_step!r}",
             *self.extra,
-            f"dump logs all custom {self.every} {dump} {STATE}", f'dump_modify logs sort id {line} "%d{" %.17g" * 15}"',
+            f"dump logs all custom {self.every} {dump} {atoms}",
+            f'dump_modify logs sort id {line} "%d{" %.17g" * (len(atoms.split()) - 1)}"',
             *([local, f'dump_modify local {line} "{" ".join(["%.17g"] * 13)}"'] if self.local else []),
             "thermo_style custom step atoms " + " ".join(f"f_hits[{i}]" for i in range(1, 14)),
             'thermo_modify norm no lost error format float "%.17g"', f"thermo {self.every}", self.run if run is None else run, ""])
 
 
 def start(folder: Path, case: Case, *, engine: str = "liggghts", ranks: int = 1, **words: str | None) -> Run:
+    if "logs" in case.words.split():
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "logs.txt").write_text(case.logs_file())
     return DRIVERS[engine].run_deck(folder, case.text(engine, ranks=ranks, **words), ranks=ranks)
 
 
@@ -122,6 +144,9 @@ class Result:
 
     def spin(self, frame: int = -1) -> NDArray[np.float64]:
         return self.frames[frame][:, 7:10]
+
+    def axis(self, frame: int = -1) -> NDArray[np.float64]:
+        return self.frames[frame][:, 17:20]
 
     def energy(self, frame: int = -1) -> float:
         """Of the motion, without spin."""
