@@ -1,6 +1,6 @@
 """Logs in space in a turning drum, next to logs in cross-section: cost, tilt, impacts, and the way of the logs through an inclined drum.
 
-    python -m benchmarks.drum_capsules [--logs 300] [--revolutions 10] [--out FILE.json]
+    python -m benchmarks.drum_capsules [--logs 300] [--revolutions 10] [--only PART] [--out FILE.json]
 
 Logs are 1.2 m long in all and 0.10 to 0.24 m thick; GOST 10.4-69 has pulpwood of 8 to 24 cm and of 1.0, 1.2, ... 3.0 m. The mean ratio of
 length to diameter is 7. Density, stiffness, damping and friction are those of `benchmarks.drum_penalty`, all of them assumed, and so is the
@@ -11,7 +11,8 @@ drum: its radius of 1.3 m, and the length at which the logs fill 0.3 of it.
 - `inclined`: the drum repeats after its length (a period), and gravity is tilted by the slope; the logs move along it for ever. The mean
   speed along the axis gives the time that a log takes through a drum of a given length. A drum with a feed and a gate has ends; this has
   none, so what holds back logs at a gate is not in the numbers.
-
+- `engine`: the first two seconds of `closed` and `section` in LIGGGHTS and in Python: largest distance of a log between both after half
+  a second, and the cost of a step, medians of three rounds in which the four take turns.
 - `crib`: one step of a stack of crossed layers on a floor, with a contact of every log with every one of the layers above and below.
 
 Means have 95 % intervals over quarters of a revolution, after the first revolution. Cost is the processor time of a step.
@@ -23,6 +24,7 @@ import argparse
 import json
 import math
 import resource
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -30,8 +32,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.drum_penalty import DAMPING, DENSITY, FILLING, GRAVITY, SHELL, SPEED, STIFFNESS
+from benchmarks.drum_penalty import DAMPING, DENSITY, FILLING, GRAVITY, SHELL, SPEED, STIFFNESS, spent_by
 from dembark.physics import CapsuleSystem, Drum, ImpactMotion, ImpactSystem, Plane
+from dembark.postproc import GrainsDump
 from dembark.postproc.statistics import student
 
 Array = NDArray[np.float64]
@@ -66,14 +69,21 @@ def places(count: int, radius: float, layers: int) -> Array:
     return np.array([(*sites[k // layers], k % layers) for k in range(count)])
 
 
+def layout(count: int, *, in_space: bool) -> tuple[Array, float, float, float]:
+    """Places (m) of the logs at the start, radius (m), speed (rad/s) and length (m) of their drum; a cross-section has no length."""
+    whole = drum_length(count) if in_space else 0.0
+    layers = int(whole / (1.01 * TOTAL)) if in_space else 1
+    radius = RADIUS if in_space else math.sqrt(float(np.sum(logs(count)[0] ** 2)) / FILLING)
+    spot = places(count, radius, layers)
+    spot[:, 2] = ((spot[:, 2] + 0.5) / layers - 0.5) * whole
+    return spot, radius, SPEED * math.sqrt(RADIUS / radius), whole
+
+
 def space(count: int, slope: float | None) -> CapsuleSystem:
     """The level, closed drum (slope None), or the one that repeats along its axis, with a slope in degrees."""
     r, length, mass = logs(count)
-    whole = drum_length(count)
-    layers = int(whole / (1.01 * TOTAL))
-    spot = places(count, RADIUS, layers)
-    spot[:, 2] = ((spot[:, 2] + 0.5) / layers - 0.5) * whole
-    shell = Drum(radius=RADIUS, omega=SPEED, stiffness=SHELL)
+    spot, radius, speed, whole = layout(count, in_space=True)
+    shell = Drum(radius=radius, omega=speed, stiffness=SHELL)
     tilt = math.radians(slope or 0.0)
     return CapsuleSystem(mass, r, length, spot, stiffness=STIFFNESS, friction=FRICTION, theta=THETA, contact_damping=DAMPING,
                          gravity=(0.0, -GRAVITY * math.cos(tilt), GRAVITY * math.sin(tilt)), period=0.0 if slope is None else whole,
@@ -83,9 +93,8 @@ def space(count: int, slope: float | None) -> CapsuleSystem:
 def section(count: int) -> tuple[ImpactSystem, float]:
     """As many discs, and the speed of their drum (rad/s)."""
     r, _, mass = logs(count)
-    radius = math.sqrt(float(np.sum(r**2)) / FILLING)
-    speed = SPEED * math.sqrt(RADIUS / radius)
-    return ImpactSystem(mass, r, places(count, radius, 1)[:, :2], stiffness=STIFFNESS, friction=FRICTION, theta=THETA,
+    spot, radius, speed, _ = layout(count, in_space=False)
+    return ImpactSystem(mass, r, spot[:, :2], stiffness=STIFFNESS, friction=FRICTION, theta=THETA,
                         contact_damping=DAMPING, gravity=(0.0, -GRAVITY), walls=[Drum(radius=radius, omega=speed, stiffness=SHELL)]), speed
 
 
@@ -97,6 +106,66 @@ def run(system: CapsuleSystem | ImpactSystem, speed: float, revolutions: float) 
     begin = time.process_time()
     motion = system.run((revolutions - 1) * turn, STEP, every=every)
     return motion, (time.process_time() - begin) / max(1, round((revolutions - 1) * turn / STEP))
+
+
+def deck(count: int, steps: int, *, in_space: bool) -> tuple[str, str]:
+    """LIGGGHTS's script of the level, closed drum, or of the cross-section, and its list of logs; the last frame is dumped."""
+    r, length, mass = logs(count)
+    spot, radius, speed, whole = layout(count, in_space=in_space)
+    wide, high = 1.1 * radius, 0.6 * whole + 0.5
+    lines = ["units si", "atom_style granular", "atom_modify map array sort 0 0.0", "boundary f f f", "newton off",
+             "communicate single vel yes",
+             f"region domain block {-wide} {wide} {-wide} {wide} {-high} {high} units box",
+             "create_box 1 domain", "neighbor 0.05 bin", "neigh_modify delay 0", f"timestep {STEP!r}"]
+    for number, (place, own, weight) in enumerate(zip(spot.tolist(), r.tolist(), mass.tolist(), strict=True), 1):
+        lines += [f"create_atoms 1 single {place[0]!r} {place[1]!r} {place[2]!r} units box", f"set atom {number} diameter {2 * own!r}",
+                  f"set atom {number} mass {weight!r}"]
+    hits = (f"fix hits all lcp/impact stiffness {STIFFNESS} theta {THETA} contact_damping {DAMPING} friction {FRICTION} "
+            f"{'logs logs.txt' if in_space else ''} wall cylinder shell z 0 0 {radius!r} stiffness {SHELL} omega {speed!r}")
+    if in_space:
+        for name, side in (("back", "lo"), ("front", "hi")):
+            hits += f" wall plane {name} z {(0.5 if side == 'hi' else -0.5) * whole!r} {side} stiffness {SHELL} omega {speed!r} 0 0"
+    lines += [f"fix weight all gravity {GRAVITY} vector 0 -1 0", hits, "fix motion all nve/sphere",
+              f"dump logs all custom {max(1, steps)} logs.dump id x y z radius",
+              'dump_modify logs sort id format "%d %.15g %.15g %.15g %.15g"',
+              f"thermo {max(1, steps)}", f"run {steps}", "print finished"]
+    return "\n".join(lines) + "\n", "".join(f"{n} {float(own)!r} 0 0 1\n" for n, own in enumerate(length, 1))
+
+
+def in_engine(count: int, seconds: float = 2.0, rounds: int = 3) -> dict[str, Any]:
+    """LIGGGHTS and Python: distance of the logs (m) after half a second, cost of a step (ms) with its range, and the certificate."""
+    steps = round(seconds / STEP)
+    found: dict[str, Any] = {}
+    spent: dict[tuple[str, str], list[float]] = {}
+    with tempfile.TemporaryDirectory(prefix="dembark-logs-") as name:
+        folder = Path(name)
+
+        def engine(model: str, steps: int) -> float:
+            script, listed = deck(count, steps, in_space=model == "closed")
+            (folder / "logs.txt").write_text(listed)
+            cost, failed = spent_by(script, folder)
+            if failed:
+                raise RuntimeError(failed)
+            return cost
+
+        for model in ("closed", "section"):
+            short = round(0.5 / STEP)
+            engine(model, short)
+            system = space(count, None) if model == "closed" else section(count)[0]
+            place = system.run(short * STEP, STEP, every=short).position[-1]
+            apart = GrainsDump(folder / "logs.dump")[-1].positions[:, : place.shape[1]] - place
+            found[model] = {"apart": float(np.abs(apart).max())}
+        for _ in range(rounds):
+            for model in ("closed", "section"):
+                spent.setdefault((model, "LIGGGHTS"), []).append(1e3 * (engine(model, steps) - engine(model, 0)) / steps)
+                system = space(count, None) if model == "closed" else section(count)[0]
+                begin = time.process_time()
+                motion = system.run(steps * STEP, STEP, every=steps)
+                spent.setdefault((model, "Python"), []).append(1e3 * (time.process_time() - begin) / steps)
+                found[model]["certificate"] = float(motion.report["worst_certificate"][-1])
+    for (model, program), values in spent.items():
+        found[model][program] = {"ms_per_step": float(np.median(values)), "range": [min(values), max(values)]}
+    return found
 
 
 def crib(layers: int = 5, side: int = 160) -> dict[str, Any]:
@@ -147,13 +216,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--logs", type=int, default=300)
     parser.add_argument("--revolutions", type=float, default=10.0)
-    parser.add_argument("--only", choices=["closed", "section", "inclined", "crib"])
+    parser.add_argument("--only", choices=["closed", "section", "inclined", "engine", "crib"])
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     found: dict[str, Any] = {"logs": options.logs, "revolutions": options.revolutions, "drum_length": drum_length(options.logs)}
     if options.only in (None, "crib"):
         found["crib"] = crib()
         print("crib", found["crib"], flush=True)
+    if options.only in (None, "engine"):
+        found["engine"] = in_engine(options.logs)
+        print("engine", found["engine"], flush=True)
     if options.only in (None, "section"):
         discs, speed = section(options.logs)
         found["section"] = measure(*run(discs, speed, options.revolutions), speed)
