@@ -11,7 +11,7 @@ drum: its radius of 1.3 m, and the length at which the logs fill 0.3 of it.
 - `inclined`: the drum repeats after its length (a period), and gravity is tilted by the slope; the logs move along it for ever. The mean
   speed along the axis gives the time that a log takes through a drum of a given length. A drum with a feed and a gate has ends; this has
   none, so what holds back logs at a gate is not in the numbers.
-- `engine`: the first two seconds of `closed` and `section` in LIGGGHTS and in Python: largest distance of a log between both after half
+- `engine`: the first second of `closed` and `section` in LIGGGHTS and in Python: largest distance of a log between both after half
   a second, and the cost of a step, medians of three rounds in which the four take turns.
 - `crib`: one step of a stack of crossed layers on a floor, with a contact of every log with every one of the layers above and below.
 
@@ -132,7 +132,7 @@ def deck(count: int, steps: int, *, in_space: bool) -> tuple[str, str]:
     return "\n".join(lines) + "\n", "".join(f"{n} {float(own)!r} 0 0 1\n" for n, own in enumerate(length, 1))
 
 
-def in_engine(count: int, seconds: float = 2.0, rounds: int = 3) -> dict[str, Any]:
+def in_engine(count: int, seconds: float = 1.0, rounds: int = 3) -> dict[str, Any]:
     """LIGGGHTS and Python: distance of the logs (m) after half a second, cost of a step (ms) with its range, and the certificate."""
     steps = round(seconds / STEP)
     found: dict[str, Any] = {}

@@ -144,7 +144,7 @@ def refused(folder, words="stiffness 1e7", **settings):
     ("stiffness 1e7 wall plane floor y 0 up stiffness 1e7", "wall floor: the side can be lo or hi, not 'up'"),
     ("stiffness 1e7 wall plane floor w 0 lo stiffness 1e7", "wall floor: the axis can be x, y or z, not 'w'"),
     ("stiffness 1e7 wall cylinder drum z 0 0 -1 stiffness 1e7", "wall drum: the radius (m) must be > 0, not -1"),
-    ("stiffness 1e7 wall plane a y 0 lo stiffness 1e7 omega 3", "wall a: omega is for cylinders"),
+    ("stiffness 1e7 wall plane a y 0 lo stiffness 1e7 omega 3", "wall a: omega: the first coordinate (m) of the axis is missing"),
     ("stiffness 1e7 wall plane a y 0 lo stiffness 1e7 wall plane a x 0 lo stiffness 1e7", "wall a: there is a wall of this name already"),
     ("stiffness 1e7 wall mesh floor stl stiffness 1e7", "wall floor: there is no fix mesh/surface with the ID stl"),
     ("stiffness 1e7 impacts no/such/folder/file.txt", "impacts: file no/such/folder/file.txt cannot be written"),
