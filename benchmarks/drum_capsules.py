@@ -126,8 +126,8 @@ def deck(count: int, steps: int, *, in_space: bool) -> tuple[str, str]:
         for name, side in (("back", "lo"), ("front", "hi")):
             hits += f" wall plane {name} z {(0.5 if side == 'hi' else -0.5) * whole!r} {side} stiffness {SHELL} omega {speed!r} 0 0"
     lines += [f"fix weight all gravity {GRAVITY} vector 0 -1 0", hits, "fix motion all nve/sphere",
-              f"dump logs all custom {max(1, steps)} logs.dump id x y z radius",
-              'dump_modify logs sort id format "%d %.15g %.15g %.15g %.15g"',
+              f"dump logs all custom {max(1, steps)} logs.dump id x y z radius mass",
+              'dump_modify logs sort id format "%d %.15g %.15g %.15g %.15g %.15g"',
               f"thermo {max(1, steps)}", f"run {steps}", "print finished"]
     return "\n".join(lines) + "\n", "".join(f"{n} {float(own)!r} 0 0 1\n" for n, own in enumerate(length, 1))
 
