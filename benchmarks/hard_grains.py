@@ -115,8 +115,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     law: dict[str, Any] = {"friction": given.friction, "beta": given.beta, "contact_duration": given.contact_duration}
     if given.what == "map":
-        print("grains, restitution, peak acceleration over g, Young's modulus (Pa); soft over hard: height, power, first and second harmonic and "
-              "fluctuation of the height")
+        print("grains, restitution, peak acceleration over g, Young's modulus (Pa); soft over hard: height, power, "
+              "first and second harmonic and fluctuation of the height")
         for row in compared(given.campaign, given.packings, law):
             print(row, flush=True)
         return 0

@@ -143,7 +143,8 @@ class Drive:
 
 
 def spectrum(heights: Array) -> tuple[float, float, float]:
-    """Of `heights` (periods, times): amplitudes of the first two harmonics of the period, and the root mean square of all else but the mean."""
+    """Of `heights` (periods, times): amplitudes of the first two harmonics of the period, and the root mean square of the rest, without the
+    mean."""
     mean = heights.mean(axis=0)
     harmonics = np.fft.rfft(mean)[1:3]
     kept = np.fft.irfft(np.concatenate([[mean.sum()], harmonics]), len(mean))

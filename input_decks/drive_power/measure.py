@@ -54,7 +54,8 @@ def measure(replicas: Replicas) -> Measurement:
         "flight": Value(over(Drive.flight), exact(block.flight) if block else None),
         "rise": Value(over(Drive.rise, diameter)),
         "height": Value(over(Drive.height, diameter)),
-        **{name: once(lambda one, k=k: one.spectrum()[k] / diameter) for k, name in enumerate(SPECTRUM)},
+        **{name: Value(divided(over_chaotic(numbers), diameter))
+           for name, numbers in zip(SPECTRUM, zip(*[one.spectrum() for one in runs], strict=True), strict=True)},
         "kinetic_energy": Value(over(Drive.kinetic, runs[0].weight * diameter)),
         "power_time": once(Drive.power_time),
         "rise_time": once(Drive.rise_time),
