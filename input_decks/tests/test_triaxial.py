@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.common.errors import DembarkError
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.validation.case.deck import derived, prepare
 from dembark.validation.case.folders import find
@@ -72,13 +73,14 @@ def verdicts(**changes: Any) -> dict[str, dict[str, Any]]:
     return judged("triaxial", triaxial.measure([compressed(**changes)]))
 
 
-def of_stresses(cohesion: float) -> dict[str, dict[str, Any]]:
+def of_stresses(cohesion: float, bridge_volume: float = 0.0) -> dict[str, dict[str, Any]]:
     """The study of runs with a friction of q/p = 0.8 and this cohesion over the mean stress across."""
     stresses = np.array([500.0, 2000.0, 8000.0])
     along = 2.0 * stresses + cohesion * stresses.mean()
     ratios = 3.0 * (along - stresses) / (along + 2.0 * stresses)
     return judged("triaxial", triaxial.study("confinement", [
-        point({"confining_stress": stress}, {"last_ratio": ratio}, half=1e-4) for stress, ratio in zip(stresses, ratios, strict=True)],
+        point({"confining_stress": stress, "bridge_volume": bridge_volume}, {"last_ratio": ratio}, half=1e-4)
+        for stress, ratio in zip(stresses, ratios, strict=True)],
         "confining_stress"))
 
 
@@ -127,6 +129,30 @@ def test_the_stiffness_of_a_lattice_is_that_of_its_springs() -> None:
     overlap = (0.75e-4 / (0.5 * p["youngs_modulus"] * math.sqrt(0.25 * D))) ** (2.0 / 3.0)
     np.testing.assert_allclose(found, np.eye(3) * 1.5e-4 / overlap / D, rtol=1e-6, atol=1e-3)
     assert triaxial.youngs_modulus(found) == pytest.approx(1.5e-4 / overlap / D)
+
+
+def test_what_holds_for_dry_grains_with_friction_is_not_asked_of_others() -> None:
+    wet = verdicts(bridge_volume=1e-13)
+    assert {"modulus_over_affine", "affine_excess"} & set(wet) == set() and wet["confining_error"]["verdict"] == "pass"
+    assert of_stresses(0.2, bridge_volume=1e-13)["cohesion_ratio"]["reason"] == "liquid bridges"
+    slippery = compressed(**LATTICE)
+    slippery.derived["grain_static"] = 0.0
+    assert "without friction" in judged("triaxial", triaxial.measure([slippery]))["modulus_over_affine"]["reason"]
+
+
+@pytest.mark.parametrize(("values", "expected"), [
+    ({"grain_count": 0}, "grain_count = 0 is out of range"),
+    ({"confining_stress": -5.0}, "confining_stress = -5"),
+    ({"confining_stress": 1e5}, "overlap by more than 3 %"),
+    ({"confining_stress": 8000.0, "inertial_number": 0.1}, "the test lasts 150 steps, and time.csv has 1000 rows"),
+    ({"grain_count": 50, "strain": 0.5}, "the cell becomes 0.00209 m high, grains are up to 0.0012 m large"),
+    ({**LATTICE, "grain_count": 96, "static_friction": 1.2}, "a lattice with a friction of 1 and more does not fail"),
+    ({**LATTICE, "grain_count": 100}, "the lattice has 96 n³ equal grains")])
+def test_a_mistake_gets_one_line(values: dict[str, Any], expected: str) -> None:
+    case = find("triaxial")
+    with pytest.raises(DembarkError) as refused:
+        prepare(case, resolve(case, None, None, values))
+    assert expected in str(refused.value) and "\n" not in str(refused.value)
 
 
 def test_a_cell_of_constant_width_is_an_oedometer() -> None:

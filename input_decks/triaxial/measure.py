@@ -178,9 +178,15 @@ def measure(replicas: Replicas) -> Measurement:
     if lattice:
         values["lattice_ratio"] = Value(over["lattice_ratio"], over["lattice_theory"])
         del values["affine_excess"]
-    values["modulus_over_affine"] = Value(over["modulus_over_affine"], exact(1.0), inapplicable="" if lattice else "grains in disorder")
+    other = "" if replicas[0].derived["grain_static"] else "grains without friction, whose contacts have no tangential stiffness"
+    other = other if lattice else "grains in disorder"
+    values["modulus_over_affine"] = Value(over["modulus_over_affine"], exact(1.0), inapplicable=other)
     for name in {"affine_excess", "confining_error", "contact_stress_error"} & set(values):
         values[name] = Value(over[name], exact(0.0))
+    if p["bridge_volume"] > 0.0:
+        # Affine contacts count as dry, their forces as those of springs alone.
+        for name in {"modulus_over_affine", "affine_excess"} & set(values):
+            del values[name]
     if p["condition"] != "constant_stress":
         # A cell of constant width has another modulus, and holds no stress across.
         for name in {"modulus_over_affine", "affine_excess", "confining_error"} & set(values):
@@ -220,7 +226,9 @@ def study(name: str, results: Points, along: str) -> Measurement:  # noqa: ARG00
         slope = fitted(ratio)[1]
         return math.degrees(math.asin((slope - 1.0) / (slope + 1.0)))
 
-    found = {"cohesion_ratio": Value(propagated(cut, ratios, halves, "the ratios"), exact(0.0)),
+    wet = any(one["parameters"]["bridge_volume"] > 0.0 for one in results)
+    cohesion = propagated(cut, ratios, halves, "the ratios")
+    found = {"cohesion_ratio": Value(cohesion, exact(0.0), inapplicable="liquid bridges" if wet else ""),
              "mohr_angle": Value(propagated(mohr, ratios, halves, "the ratios"))}
     half = 0.5 * np.abs(along_axis(ratios + halves) - along_axis(ratios - halves))
     return Measurement(found, [profile("mohr", "Stresses at the end", "stress across (Pa)", "stress along the axis (Pa)", across,

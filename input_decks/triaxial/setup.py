@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dembark.common.errors import DembarkError
 from dembark.input_decks.common import packing
 from dembark.input_decks.common.packing import Packing
 from dembark.input_decks.common.setup import Parameters, Setup, contacts, time_step
@@ -14,12 +15,20 @@ from dembark.physics import effective_youngs_modulus
 CLOSING, GAIN, DENSE = 0.02, 0.01, 0.5
 # Times over d √(ρ/p): of the integral of the stress that is lacking, and of the rest under equal stresses, of a gas and of a lattice.
 INTEGRAL, REST, LATTICE_REST = 2.0, 30.0, 10.0
+# Shortest side of the cell over the largest diameter, at least: below 2 two grains could touch each other twice, across the border, and
+# engines find one contact for a pair; solid fraction of the densest packings of spheres in disorder.
+NARROWEST, DENSEST = 2.5, 0.64
 # Rows of time.csv between two frames; share of the strain over which its rate rises.
 ROWS, RAMP = 20, 0.1
 
 
 def setup(p: Parameters) -> Setup:
-    """A gas shrinks to DENSE, comes to rest under `confining_stress`, and is compressed by `strain` along z at `inertial_number`."""
+    """A gas shrinks to DENSE, comes to rest under `confining_stress`, and is compressed by `strain` along z at `inertial_number`.
+    DembarkError for a cell that becomes too narrow, and for a test of fewer steps than rows."""
+    shortest = p.grain_diameter * (math.pi / 6.0 * p.grain_count / DENSEST) ** (1.0 / 3.0) * math.exp(-p.strain)
+    if shortest < NARROWEST * packing.largest(p):
+        raise DembarkError(f"the cell becomes {shortest:.3g} m high, grains are up to {packing.largest(p):.3g} m large",
+                           "a grain would touch another one twice", "raise grain_count, or lower strain")
     step, rate = time_step(p), math.sqrt(p.confining_stress / p.grain_density) / p.grain_diameter
     closing, strain_rate = CLOSING * rate, p.inertial_number * rate
     if p.arrangement == "fcc":
@@ -29,6 +38,9 @@ def setup(p: Parameters) -> Setup:
         filled = bodies.volume / float(np.prod(np.ptp(bodies.box, axis=1)))
         closed = math.ceil((1.0 - (filled / DENSE) ** (1.0 / 3.0)) / closing / step)
     start, lasts = closed + math.ceil(rest / rate / step), p.strain * (1.0 + 0.5 * RAMP) / strain_rate / step
+    if lasts < ROWS * (p.frames - 1):
+        raise DembarkError(f"the test lasts {lasts:.0f} steps, and time.csv has {ROWS * (p.frames - 1)} rows of it", "",
+                           "lower inertial_number, confining_stress or frames")
     stride = ROWS * math.ceil(lasts / (ROWS * (p.frames - 1)))
     numbers = {"closed_step": closed, "start_step": start, "ramp_steps": math.ceil(RAMP * lasts), "first": start, "stride": stride,
                "every": stride // ROWS, "steps": start + stride * (p.frames - 1), "closing_rate": closing, "gain": GAIN * rate,

@@ -16,6 +16,7 @@ class StressedCell:
 
     `follow(integrate)`, `strain(rates)` and `record()`, each once in every step. The rates (1/s) of `follow` are `gain` times the share of
     the confining stress that is lacking or too much, and its integral over the steps with `integrate`, divided by `integral_time`.
+    YADE's PeriTriaxController would hold stresses, too, but with a law of its own: here cells move as those of LIGGGHTS and LAMMPS do.
     """
 
     def __init__(self, p):
