@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from dembark.physics.exact.contact_law import solved
 from dembark.physics.exact.impacts import Impacts
@@ -17,7 +20,7 @@ from dembark.postproc import GrainsDump
 from dembark.postproc.measurement import Array, Curve, Estimate, profile
 from dembark.postproc.output.vtkhdf import Surface
 from dembark.postproc.statistics import block_mean
-from dembark.postproc.walls.mesh import cut
+from dembark.postproc.walls.mesh import PRECISION, cut
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -106,8 +109,8 @@ class ContactRecord:
         return np.hypot(closing, slip), np.arctan2(closing, slip)
 
     def shadows(self, modulus: float, restitution: float) -> tuple[Array, Array]:
-        """Peak forces (impacts,) in N and durations (impacts,) in s of the same impacts, each solved anew as that of a single grain, with
-        another `modulus` (Pa, E*)."""
+        """Peak forces (impacts,) in N and durations (impacts,) in s of half sines, see `lone_impacts`, of the same impacts, each solved anew
+        as that of a single grain, with another `modulus` (Pa, E*)."""
         chosen = self.begins
         return lone_impacts(self.masses[chosen], self.radii[chosen], self.closing[chosen], modulus, restitution)
 
@@ -135,10 +138,12 @@ class ContactRecord:
 
 
 def lone_impacts(masses: Array, radii: Array, closing: Array, modulus: float, restitution: float) -> tuple[Array, Array]:
-    """Peak forces (n,) in N and durations (n,) in s of grains with `masses` (kg) and `radii` (m) that each hit a plane of infinite mass
-    with the speeds `closing` (m/s) along its normal: Hertz with the `modulus` (Pa, E*) and the dashpot of this `restitution`."""
-    one, (harder, longer) = _on_plane(masses, radii, closing, modulus, restitution), _damped(restitution)
-    return harder * one.peak_force, longer * one.duration
+    """Peak forces (n,) in N of grains with `masses` (kg) and `radii` (m) that each hit a plane of infinite mass with the speeds `closing`
+    (m/s) along its normal: Hertz with the `modulus` (Pa, E*) and the dashpot of this `restitution`; and durations (n,) in s of the half
+    sines with these peaks and the impulses of the impacts. With the durations of the contacts they would have 1.17 times the impulse of an
+    elastic impact, 1.29 times that of a restitution of 0.5."""
+    peaks = _damped(restitution) * _on_plane(masses, radii, closing, modulus, restitution).peak_force
+    return peaks, 0.5 * np.pi * (1.0 + restitution) * masses * closing / peaks
 
 
 def mean_pressures(forces: Array, radii: Array, modulus: float) -> Array:
@@ -154,12 +159,11 @@ def _on_plane(masses: Array, radii: Array, closing: Array, modulus: float, resti
 
 
 @cache
-def _damped(restitution: float) -> tuple[float, float]:
-    """Peak force and duration over those of an elastic impact: the law has no speed or size of its own, so they hold for all."""
+def _damped(restitution: float) -> float:
+    """Peak force over that of an elastic impact: the law has no speed or size of its own, so it holds for all."""
     one = np.ones(1)
     unit = _on_plane(one, one, one, 1.0, restitution)
-    damped = solved(unit, 100)
-    return float(damped.force[0] / unit.peak_force[0]), float(damped.duration[0] / unit.duration[0])
+    return float(solved(unit, 100).force[0] / unit.peak_force[0])
 
 
 def read_record(path: Path, motion: WallMotion, part: MeshWall, *, stride: int, time_step: float, first: int, periods: int, period: float,
@@ -188,7 +192,7 @@ def read_record(path: Path, motion: WallMotion, part: MeshWall, *, stride: int, 
 
     surface = own + np.cross(column("omegas"), -length * normal)
     rubbing = -np.einsum("na,na->n", along(forces), along(surface))
-    around = float(np.linalg.norm(np.diff(cut(part.triangles), axis=1), axis=2).sum())
+    around = float(np.linalg.norm(np.diff(outline(part), axis=1), axis=2).sum())
     return ContactRecord(steps, column("ids").astype(np.int64), column("masses"), column("radii"), -np.einsum("na,na->n", own, normal),
                          np.linalg.norm(along(own), axis=1), points, normal, forces, rubbing, stride, time_step, first, periods, period,
                          around * depth)
@@ -210,10 +214,29 @@ def _counts(name: str, title: str, along: str, edges: Array, runs: list[ContactR
     return profile(name, title, along, "impacts per second and bin", 0.5 * (edges[1:] + edges[:-1]), found)
 
 
+def outline(part: MeshWall) -> Array:
+    """Straight pieces (k, 2, 2) of x and z in m of the section of the `part` by y = 0, without those round cavities: no grain gets there."""
+    pieces = cut(part.triangles)
+    near = cKDTree(pieces.reshape(-1, 2)).query_pairs(PRECISION, output_type="ndarray") // 2
+    count = len(pieces)
+    loops, loop = connected_components(coo_matrix((np.ones(len(near)), near.T), shape=(count, count)), directed=False)
+    outside = np.ones(loops, bool)
+    for number in range(loops):
+        # A ray from inside of another loop crosses that an odd number of times.
+        x, z = pieces[loop == number][0, 0]
+        crossed = (pieces[:, 0, 0] > x) != (pieces[:, 1, 0] > x)
+        one, other = np.moveaxis(pieces[crossed], 1, 0)
+        above = one[:, 1] + (x - one[:, 0]) / (other[:, 0] - one[:, 0]) * (other[:, 1] - one[:, 1]) > z
+        times = np.bincount(loop[crossed][above], minlength=loops)
+        outside[number] = not (np.delete(times, number) % 2).any()
+    # Where a triangle has but a corner in the plane, its piece has no length.
+    return np.asarray(pieces[outside[loop] & (np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1) > PRECISION)])
+
+
 def strips(part: MeshWall, size: float) -> Array:
-    """The section of the `part` by y = 0 as straight pieces (k, 2, 2) of x and z in m, none longer than `size` (m)."""
+    """The `outline` of the `part` in straight pieces (k, 2, 2) of x and z in m, none longer than `size` (m)."""
     pieces = []
-    for one, other in cut(part.triangles):
+    for one, other in outline(part):
         parts = max(1, int(np.ceil(np.linalg.norm(other - one) / size - 1e-9)))
         ends = one + np.linspace(0.0, 1.0, parts + 1)[:, None] * (other - one)
         pieces.append(np.stack([ends[:-1], ends[1:]], axis=1))

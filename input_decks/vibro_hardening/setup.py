@@ -31,11 +31,15 @@ def setup(p: Parameters) -> Setup:
     centre, depth = np.array([0.0, 0.0, -0.2 * p.trough_width]), 2.0 * p.grain_diameter
     part = part_mesh(p, depth) + centre
     reach = float(np.linalg.norm((part - centre)[..., [0, 2]], axis=2).max())
-    clear = 0.3 * p.trough_width - (amplitude(p) if p.part_held == "at_rest" else 0.0)
-    if clear < reach + 1.5 * p.grain_diameter:
+    turn = np.linspace(still, still + p.motion_ramp + 1.0, 100 * (math.ceil(p.motion_ramp) + 1)) / p.motion_frequency
+    travel = float(np.linalg.norm(moving.displacement(turn), axis=1).max())
+    # A grain on the trough is farther from the part than the deck looks for grains on the part, by `near`.
+    room = p.grain_diameter + 0.65 * packing.largest(p)
+    clear = 0.3 * p.trough_width - (travel if p.part_held == "at_rest" else 0.0)
+    if clear < reach + room:
         raise DembarkError(f"the trough is too narrow for the part, which reaches {reach:.3g} m from its centre",
                            "grains would touch both at once", f"raise trough_width, or take a part that reaches less than "
-                           f"{max(0.0, clear - 1.5 * p.grain_diameter):.3g} m")
+                           f"{max(0.0, clear - room):.3g} m")
     places, top = sites(p, (centre[0], centre[2], reach))
     beyond = amplitude(p) + 2.0 * p.grain_diameter
     wide, high = 0.5 * p.trough_width + beyond, max(p.trough_side, top) + beyond
@@ -59,8 +63,9 @@ def part_mesh(p: Parameters, depth: float) -> Array:
         return prism(polygon(p.part_diameter, p.part_corners, (0.0, 0.0)), depth)
     body = read_body(FOLDER / "part.stl")
     mesh = body.triangles - body.mass.centre
-    if np.abs(mesh).max() > p.trough_width:
-        raise DembarkError(f"part.stl is {np.ptp(mesh, axis=(0, 1)).max():g} m long", "it was drawn in mm, maybe", "write the file in m")
+    section = mesh[..., [0, 2]]
+    if np.abs(section).max() > p.trough_width:
+        raise DembarkError(f"part.stl is {np.ptp(section, axis=(0, 1)).max():g} m wide", "it was drawn in mm, maybe", "write the file in m")
     if not len(cut(mesh)):
         raise DembarkError("the layer of grains misses part.stl", "the plane through its centre of mass across y does not cut it",
                            "take another part")
