@@ -109,8 +109,8 @@ class ContactRecord:
         return np.hypot(closing, slip), np.arctan2(closing, slip)
 
     def shadows(self, modulus: float, restitution: float) -> tuple[Array, Array]:
-        """Peak forces (impacts,) in N and durations (impacts,) in s of half sines, see `lone_impacts`, of the same impacts, each solved anew
-        as that of a single grain, with another `modulus` (Pa, E*)."""
+        """Peak forces (impacts,) in N and durations (impacts,) in s of half sines (see `lone_impacts`) of the same impacts, each solved
+        anew as that of a single grain, with another `modulus` (Pa, E*)."""
         chosen = self.begins
         return lone_impacts(self.masses[chosen], self.radii[chosen], self.closing[chosen], modulus, restitution)
 
@@ -215,7 +215,7 @@ def _counts(name: str, title: str, along: str, edges: Array, runs: list[ContactR
 
 
 def outline(part: MeshWall) -> Array:
-    """Straight pieces (k, 2, 2) of x and z in m of the section of the `part` by y = 0, without those round cavities: no grain gets there."""
+    """Straight pieces (k, 2, 2) of x and z in m of the section of the `part` by y = 0, without those round cavities, out of reach."""
     pieces = cut(part.triangles)
     near = cKDTree(pieces.reshape(-1, 2)).query_pairs(PRECISION, output_type="ndarray") // 2
     count = len(pieces)
