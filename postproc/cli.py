@@ -382,7 +382,7 @@ def tracks(
         chosen = select(opened, frame_numbers(frames, len(opened.grains)))
         with progress("tracks", len(chosen.numbers)) as advance:
             found = tracking.follow(chosen, ids, advance)
-        notes = chosen.lines([])
+        notes = [*(f"note: {one}" for one in found.notes), *chosen.lines([])]
     seen = [found] if measured is None else tracking.common(found, measured)
     time, ends = interval or (measured.interval if measured else None), between or tracking.usual_lags(*seen)
     movements = {one.name: tracking.measure(one, time, ends) for one in seen}

@@ -59,8 +59,8 @@ class _Held(Generic[Column]):
 class GrainFrame:
     """All n grains at one step, sorted by id; SI units.
 
-    `time` (s) is what the dump says by `ITEM: TIME`, or None. `positions` (m) are unwrapped where the dump has image flags, `wrapped` are
-    those inside the box; `velocities` (m/s), `omegas` (rad/s), `forces` (N, all contacts and gravity)
+    `time` (s) is what the dump says by `ITEM: TIME`, or None. `positions` (m) go on through periodic faces where `unwrapped` says so: the
+    dump has image flags or such positions; `wrapped` are those inside the box; `velocities` (m/s), `omegas` (rad/s), `forces` (N, all contacts and gravity)
     are (n, 3); `radii` (m), `masses` (kg), `ids`, `types` are (n,);
     `wall_forces[name]` (n, 3) is the force of that wall on each grain (N). `low`, `high` (m) and `periodic` describe the box, which
     `tilt` = (xy, xz, yz) (m) shears: its edges are (Lx, 0, 0), (xy, Ly, 0), (xz, yz, Lz). `extra` holds every other column (n,) by
@@ -86,6 +86,7 @@ class GrainFrame:
     extra: Mapping[str, Array] = field(default_factory=dict)
     where: str = ""
     time: float | None = None
+    unwrapped: bool = False
 
     def __repr__(self) -> str:
         return f"GrainFrame(step={self.step}, {len(self.ids)} grains)"
@@ -139,8 +140,8 @@ class _Table:
 Say = Callable[[str], object]
 
 
-def _positions(table: _Table, say: Say) -> tuple[Array, Array]:
-    """Unwrapped positions, and those inside the box."""
+def _positions(table: _Table, say: Say) -> tuple[Array, Array, bool]:
+    """Unwrapped positions, those inside the box, and whether the dump has what unwraps them."""
     raw = table.raw
     edges = cell(raw.low, raw.high, raw.tilt)
     wrapped: Array | None = None
@@ -153,6 +154,7 @@ def _positions(table: _Table, say: Say) -> tuple[Array, Array]:
         unwrapped = table(*_UNWRAPPED)
     elif table.has(_SCALED_UNWRAPPED):
         unwrapped = raw.low + table(*_SCALED_UNWRAPPED) @ edges
+    known = unwrapped is not None or table.has(_IMAGES)
     if wrapped is None:
         if unwrapped is None:
             raise DumpError(f"{table.where}: column x, y, z is missing, and so are xu, xs and xsu; there are {' '.join(raw.columns)}")
@@ -160,7 +162,7 @@ def _positions(table: _Table, say: Say) -> tuple[Array, Array]:
     elif unwrapped is None:
         unwrapped = wrapped + _images(table, say) @ edges if table.has(_IMAGES) else wrapped.copy()
     table.taken.update(_IMAGES)
-    return unwrapped, wrapped
+    return unwrapped, wrapped, known
 
 
 def _images(table: _Table, say: Say) -> Array:
@@ -208,7 +210,7 @@ def grain_frame(raw: RawFrame, where: str, density: float | None = None, say: Sa
     else:
         radii = table("radius")
     walls = dict.fromkeys(match.group(1) for name in raw.columns if (match := _WALL.fullmatch(name)) and table.has(_wall(match.group(1))))
-    positions, wrapped = _positions(table, say)
+    positions, wrapped, unwrapped = _positions(table, say)
     masses, wall_forces = _masses(table, radii, density, say), {wall: table(*_wall(wall)) for wall in walls}
     for name, values in (("radius", radii), ("mass", masses)):
         if values.min(initial=0.0) < 0.0:
@@ -219,7 +221,7 @@ def grain_frame(raw: RawFrame, where: str, density: float | None = None, say: Sa
     extra = {name: table(name) for name in raw.columns if name not in table.taken}
     return GrainFrame(step=raw.step, low=raw.low, high=raw.high, periodic=raw.periodic, tilt=raw.tilt, ids=table.ids, types=types,
                       positions=positions, wrapped=wrapped, velocities=velocities, omegas=omegas, forces=forces, radii=radii, masses=masses,
-                      wall_forces=wall_forces, extra=extra, where=where, time=raw.time)
+                      wall_forces=wall_forces, extra=extra, where=where, time=raw.time, unwrapped=unwrapped)
 
 
 def _wall(name: str) -> tuple[str, ...]:

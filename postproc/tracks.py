@@ -81,7 +81,8 @@ def growth(near: Displacements, far: Displacements, keep: NDArray[np.bool_]) -> 
 @dataclass(frozen=True)
 class Tracks:
     """Tracks of n grains at T times: `positions` (T, n, c), m, along the c `axes`, NaN where a grain is not seen; without the jumps of a
-    periodic box. `ids` (n,), `times` (T,) in s. `others`: further columns (T, n) by their names in OTHERS. `name` begins messages."""
+    periodic box. `ids` (n,), `times` (T,) in s. `others`: further columns (T, n) by their names in OTHERS. `name` begins messages; `notes` are
+    lines about what may be wrong with them."""
 
     ids: NDArray[np.int64]
     times: Array
@@ -89,6 +90,7 @@ class Tracks:
     axes: str = AXES
     others: Mapping[str, Array] = field(default_factory=dict)
     name: str = "the tracks"
+    notes: tuple[str, ...] = ()
 
     @property
     def interval(self) -> float:
@@ -215,7 +217,7 @@ def _flatness(values: Array) -> float:
 def follow(chosen: Selection, ids: Sequence[int] | None = None, advance: Callable[[], None] = lambda: None) -> Tracks:
     """The tracks of the grains `ids` (default: those of the first frame) through the frames of a run. DembarkError for grains that no frame
     has. Positions inside a periodic box are joined over its faces where the dump has no image flags: a grain must then move less than half
-    a period from frame to frame."""
+    a period from frame to frame. Where the velocities of the dump say that one moves farther, a note says so."""
     source, first = chosen.source, chosen.first
     wanted = np.unique(np.asarray(first.ids if ids is None else ids, dtype=np.int64))
     shape = (len(chosen.numbers), len(wanted))
@@ -227,7 +229,7 @@ def follow(chosen: Selection, ids: Sequence[int] | None = None, advance: Callabl
         at = np.minimum(np.searchsorted(grains.ids, wanted), max(len(grains.ids) - 1, 0))
         there = grains.ids[at] == wanted if len(grains.ids) else np.zeros(len(wanted), bool)
         row = at[there]
-        places[number, there] = joined(grains, row, there)
+        places[number, there] = joined(grains, row, there, times[number] - times[max(number - 1, 0)])
         for name, values in _columns(grains, contacts).items():
             columns.setdefault(name, np.full(shape, np.nan))[number, there] = values[row]
         advance()
@@ -236,7 +238,7 @@ def follow(chosen: Selection, ids: Sequence[int] | None = None, advance: Callabl
         raise DembarkError(f"there is no grain {absent[0]} in the chosen frames", f"{source.path}", f"the first has {_named(first.ids)}")
     if not source.timed:
         raise DembarkError("the times of the frames are not known", f"{source.path}", "give --time-step")
-    return Tracks(wanted, times, places, others=columns, name=str(source.path))
+    return Tracks(wanted, times, places, others=columns, name=str(source.path), notes=joined.notes)
 
 
 class _Joined:
@@ -244,12 +246,24 @@ class _Joined:
 
     def __init__(self, count: int) -> None:
         self.last = np.full((count, 3), np.nan)
+        self.farthest = 0.0  # by the velocities, from frame to frame, in periods
 
-    def __call__(self, grains: GrainFrame, row: NDArray[np.intp], there: NDArray[np.bool_]) -> Array:
-        """Those of the grains in these rows of a frame, which are those of the tracks that `there` (n,) marks."""
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A line where a grain moved half a period or more from frame to frame."""
+        return () if self.farthest < 0.5 else (
+            f"by their velocities grains move up to {self.farthest:.2g} periods from frame to frame, and the dump has no image flags: tracks "
+            "may be wrong by periods; dump ix iy iz, or more frames",)
+
+    def __call__(self, grains: GrainFrame, row: NDArray[np.intp], there: NDArray[np.bool_], interval: float) -> Array:
+        """Those of the grains in these rows of a frame, which are those of the tracks that `there` (n,) marks, `interval` (s) after the
+        frame before."""
         places = grains.positions[row]
-        if grains.periodic.any() and np.array_equal(grains.positions, grains.wrapped):
+        if grains.periodic.any() and not grains.unwrapped:
             edges, before = cell(grains.low, grains.high, grains.tilt), self.last[there]
+            if grains.has("velocities"):
+                moves = np.linalg.solve(edges.T, interval * grains.velocities[row].T)[grains.periodic]
+                self.farthest = max(self.farthest, float(np.abs(moves).max(initial=0.0)))
             periods = np.where(grains.periodic, np.round(np.linalg.solve(edges.T, (places - before).T).T), 0.0)
             places = places - np.nan_to_num(periods) @ edges
         self.last[there] = places

@@ -89,6 +89,29 @@ def test_tracks_go_through_the_faces_of_a_periodic_box(tmp_path, image_flags):
     assert (found.others["vx"] == 0.5).all()
 
 
+@pytest.mark.parametrize("columns", ["x y z ix iy iz", "xu yu zu ix iy iz", "x y z a b c"])
+def test_positions_that_are_not_wrapped_are_used_though_they_all_lie_in_the_box(tmp_path, columns):
+    """Without such columns the nearest image is taken, as in the last."""
+    box = ((0.0, 1.0), (0.0, 1.0), (-1.0, 1.0))
+    text = "".join(grains_text(100 * frame, np.array([[x, 0.5, 0.0]]), [0.1], box=box, flags="pp pp ff")
+                   for frame, x in enumerate((0.05, 0.75, 0.05)))
+    (tmp_path / "grains.dump").write_text(text.replace("x y z ix iy iz", columns))
+    found = tracking.follow(select(open_source(tmp_path / "grains.dump", time_step=1e-5), range(3)))
+    assert found.positions[1, 0, 0] == pytest.approx(-0.25 if columns.endswith("c") else 0.75)
+
+
+@pytest.mark.parametrize(("image_flags", "frames", "noted"), [(False, 30, True), (False, 120, False), (True, 30, False)])
+def test_a_note_says_where_grains_pass_half_a_period_between_frames(tmp_path, monkeypatch, capsys, image_flags, frames, noted):
+    """0.5 m/s over 1.5 ms or 0.375 ms in a period of 1 mm."""
+    monkeypatch.chdir(tmp_path)
+    time = 0.045 / frames
+    places = 5e-4 + np.tile(0.5 * time * np.arange(frames)[:, None, None], (1, 4, 1))
+    dumped(tmp_path, places, image_flags)
+    assert main(["tracks", "grains.dump", "--time-step", repr(time / 100)]) == 0
+    note = "note: by their velocities grains move up to 0.75 periods from frame to frame"
+    assert (note in capsys.readouterr().out) == noted
+
+
 def test_lost_grains_have_gaps_and_come_back(tmp_path):
     exact = 5e-4 + walk(grains=8, frames=30).positions
     source = open_source(dumped(tmp_path, exact, absent=[(10, 2), (11, 2), (29, 3)]), time_step=1e-5)
