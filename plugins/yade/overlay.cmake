@@ -25,6 +25,11 @@ if(patched STREQUAL script)
   message(FATAL_ERROR "dembark: ${PREFIX}/bin/yade does not look like YADE's start script (no sys.path.insert line); this YADE is not supported")
 endif()
 # A user's mistake is one line, not a trace.
+string(REPLACE "\nif opts.script:\n"
+"\nif opts.script and not os.path.exists(opts.script):
+\tprint('dembark: there is no script '+opts.script,file=sys.stderr)
+\tsys.exit(2)
+if opts.script:\n" patched "${patched}")
 string(REPLACE "\t\t\t\texcept: # all other exceptions\n"
 "\t\t\t\texcept (NameError,ImportError) as error: # of a part that this build of YADE lacks
 \t\t\t\t\tfrom yade.dembark.features import missing

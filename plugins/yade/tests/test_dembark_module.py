@@ -6,6 +6,8 @@ import textwrap
 import numpy as np
 import pytest
 
+from dembark.validation import engines
+
 LOW, HIGH = np.array([-0.05, 0.0, -0.01]), np.array([0.05, 0.02, 0.05])
 
 
@@ -189,6 +191,20 @@ def test_output_files_are_cut_behind_the_state_or_left(yade):
 
 def test_a_deck_without_numbers_says_where_they_come_from(yade):
     assert_one_line(yade(script(yade, "bare", "p = dembark.parameters()\nprint('went on')\n")), ("dembark deck",))
+
+
+def test_a_deck_takes_the_words_of_restarts_only(yade):
+    deck = script(yade, "words", "p = dembark.parameters(size=0.1)\nprint('went on', dembark.options())\n")
+    assert_one_line(yade(deck, "size=0.2"), ("argument 'size=0.2'", "write the deck anew"))
+    for word in ("restart_evry=5", "diameter=0.2", "yes"):
+        assert_one_line(yade(deck, word), (f"argument '{word}' is not known to a deck", "restart_every=<steps> and resume=yes|no"))
+    assert "went on (5, False)" in yade(deck, "restart_every=5", "resume=no").stdout
+
+
+@pytest.mark.parametrize("exits", [["-x"], []])
+def test_a_script_that_is_not_there_is_one_line(yade, exits):
+    done = engines.call([yade.engine.executable, "-n", *exits, "absent.py"], yade.folder, yade.engine.environment())
+    assert (done.returncode, done.stderr) == (2, "dembark: there is no script absent.py\n") and "Yade" not in done.stdout
 
 
 @pytest.mark.parametrize("run", ["O.run(5, True)", "O.step()"])

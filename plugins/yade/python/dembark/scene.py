@@ -24,6 +24,7 @@ from yade import (
     utils,
 )
 from yade.dembark.report import fail
+from yade.dembark.states import WORDS
 from yade.dembark.writers import DumpWriter, HistoryWriter
 from yade.minieigenHP import Vector3
 
@@ -31,13 +32,16 @@ O = Omega()
 
 
 def parameters(**numbers):
-    """The numbers of a run by name; 'dembark deck' writes them into the deck. A word behind the script that would change one is refused:
-    others were computed from it."""
+    """The numbers of a run by name; 'dembark deck' writes them into the deck. A word behind the script is refused, but for those of
+    `options`: from a number others were computed."""
     if not numbers:
         fail("this deck has no numbers; write it with 'dembark deck CASE --engine yade --out FOLDER'")
     for word in sys.argv[1:]:
-        if word.partition("=")[0] in numbers:
+        name = word.partition("=")[0]
+        if name in numbers:
             fail(f"argument '{word}': other numbers of this deck were computed from it; write the deck anew with 'dembark deck --set'")
+        if name not in WORDS:
+            fail(f"argument '{word}' is not known to a deck; it takes restart_every=<steps> and resume=yes|no")
     return SimpleNamespace(**numbers)
 
 

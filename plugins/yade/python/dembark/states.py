@@ -12,13 +12,15 @@ from yade import DembarkStates, IntegrationMonitor, NewtonIntegrator, Omega, Sph
 from yade.dembark.report import announce, fail, finish, monitor
 
 O = Omega()
+# What may stand behind the script of a deck.
+WORDS = ("restart_every", "resume")
 
 
 @cache
 def options():
     """What the words restart_every=<steps> and resume=yes|no behind the script say: (steps between saved states, 0 never; resume or not).
 
-    Other words are the script's own.
+    Other words are the script's own; `parameters`, in decks, refuses them.
     """
     words = dict(word.split("=", 1) for word in sys.argv[1:] if "=" in word)
     every, resume = words.get("restart_every", "0"), words.get("resume", "no")
