@@ -60,7 +60,8 @@ class GrainFrame:
     """All n grains at one step, sorted by id; SI units.
 
     `time` (s) is what the dump says by `ITEM: TIME`, or None. `positions` (m) go on through periodic faces where `unwrapped` says so: the
-    dump has image flags or such positions; `wrapped` are those inside the box; `velocities` (m/s), `omegas` (rad/s), `forces` (N, all contacts and gravity)
+    dump has image flags or such positions; `wrapped` are those inside the box; `velocities` (m/s), `omegas` (rad/s), `forces` (N, all
+    contacts and gravity)
     are (n, 3); `radii` (m), `masses` (kg), `ids`, `types` are (n,);
     `wall_forces[name]` (n, 3) is the force of that wall on each grain (N). `low`, `high` (m) and `periodic` describe the box, which
     `tilt` = (xy, xz, yz) (m) shears: its edges are (Lx, 0, 0), (xy, Ly, 0), (xz, yz, Lz). `extra` holds every other column (n,) by

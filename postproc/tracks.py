@@ -81,8 +81,8 @@ def growth(near: Displacements, far: Displacements, keep: NDArray[np.bool_]) -> 
 @dataclass(frozen=True)
 class Tracks:
     """Tracks of n grains at T times: `positions` (T, n, c), m, along the c `axes`, NaN where a grain is not seen; without the jumps of a
-    periodic box. `ids` (n,), `times` (T,) in s. `others`: further columns (T, n) by their names in OTHERS. `name` begins messages; `notes` are
-    lines about what may be wrong with them."""
+    periodic box. `ids` (n,), `times` (T,) in s. `others`: further columns (T, n) by their names in OTHERS. `name` begins messages;
+    `notes` are lines about what may be wrong with them."""
 
     ids: NDArray[np.int64]
     times: Array
@@ -251,9 +251,9 @@ class _Joined:
     @property
     def notes(self) -> tuple[str, ...]:
         """A line where a grain moved half a period or more from frame to frame."""
-        return () if self.farthest < 0.5 else (
-            f"by their velocities grains move up to {self.farthest:.2g} periods from frame to frame, and the dump has no image flags: tracks "
-            "may be wrong by periods; dump ix iy iz, or more frames",)
+        note = (f"by their velocities grains move up to {self.farthest:.2g} periods from frame to frame, and the dump has no image flags: "
+                "tracks may be wrong by periods; dump ix iy iz, or more frames")
+        return (note,) if self.farthest >= 0.5 else ()
 
     def __call__(self, grains: GrainFrame, row: NDArray[np.intp], there: NDArray[np.bool_], interval: float) -> Array:
         """Those of the grains in these rows of a frame, which are those of the tracks that `there` (n,) marks, `interval` (s) after the

@@ -15,6 +15,7 @@ from dembark.validation.case import deck
 from dembark.validation.case.folders import discover, find, package_root
 from dembark.validation.case.model import Case, Parameter
 from dembark.validation.case.resolve import merged, portable
+from dembark.validation.engines.input_script import UNREAD_NOTE
 
 SCENE = Path(__file__).resolve().parents[2] / "plugins/yade/python/dembark/scene.py"
 # What parameters need to do anything.
@@ -74,6 +75,22 @@ def test_every_parameter_changes_the_input(case: str, engine: str, tmp_path: Pat
         if found.missing_capabilities(engine, changed):
             continue  # refused, see the tests of engines
         assert inputs(found, engine, changed, tmp_path) != before, name
+
+
+@pytest.mark.parametrize(("case", "engine"), [(case, engine) for case in ("silo", "vibro_sieve", "single_contact")
+                                              for engine in ("liggghts", "lammps")])
+def test_numbers_that_no_command_reads_stand_below_a_line_that_says_so(case: str, engine: str, tmp_path: Path) -> None:
+    """All stay variables, so that -var of them is refused."""
+    found = find(case)
+    values = portable(merged(found, "quick" if "quick" in found.profiles else None, None, {}))
+    deck.write(found, engine, values, tmp_path)
+    head, body = (tmp_path / engines.facts(engine).deck).read_text(encoding="utf-8").split("\n\n", 1)
+    read, unread = (re.findall(r"^variable +(\w+)", part, re.MULTILINE) for part in head.split(UNREAD_NOTE))
+    code = re.sub("#.*", "", body)
+    assert read and unread
+    assert all(re.search(rf"\${{{name}}}|\bv_{name}\b", code) for name in read)
+    assert not re.search(rf"\${{({'|'.join(unread)})}}|\bv_({'|'.join(unread)})\b", code)
+    assert {name for name, value in values.items() if value is not None} - {"replicas"} <= {*read, *unread}
 
 
 @pytest.mark.parametrize("name", [one.name for one in discover().values() if {"liggghts", "lammps"} & set(one.engines)])

@@ -26,6 +26,11 @@ from dembark.validation.case.resolve import resolve
     ("drive_power", {"time_step_fraction": 0.3}, "lower time_step_fraction"),
     ("drive_power", {"cell_width": 0.015}, "must be at least 4 grain_diameter"),
     ("drive_power", {"motion": "circular"}, "shake up and down"), ("drive_power", {"motion_amplitude": 0.002}, "not motion_amplitude"),
+    *((case, {side: 0.0019}, "cell_length and cell_width must be at least 4 grain_diameter")
+      for case in ("bulk_density", "oedometer", "shear_cell") for side in ("cell_length", "cell_width")),
+    *((case, {"liquid_content": 0.01, "bridge_volume": 8e-11}, "set liquid_content or bridge_volume, not both")
+      for case in ("plug_flow", "silo")),
+    ("vibro_sieve", {"motion": "none"}, r"motion must be harmonic, motion_direction z, with motion = none, motion_direction = z in case"),
     ("silo", {"bridge_volume": 1e-3}, "a bridge is larger than the grains"), ("silo", {"surface_tension": 72.0}, "surface_tension"),
     ("liquid_exchange", {"liquid_share": "fraction", "liquid_share_factor": 1.5}, "liquid_share_factor"),
     ("log_pair", {"velocity_1": -1.0}, "velocity_1"), ("log_pair", {"offset": 0.2}, "offset"),

@@ -56,7 +56,7 @@ def resolve(case: Case, profile: str | None = None, variant: str | None = None,
         holds = constraint.expression.evaluated(values, where=where)
         if holds is not None and not holds:
             given = ", ".join(f"{name} = {values[name]}" for name in sorted(constraint.expression.names) if values[name] is not None)
-            raise DembarkError(constraint.message, f"{given} {where}", f"it must hold that {constraint.expression.text}")
+            raise DembarkError(constraint.message, f"with {given} {where}", f"it must hold that {constraint.expression.text}")
     return values
 
 

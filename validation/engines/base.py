@@ -30,8 +30,8 @@ SWITCHES = ("DEMBARK_LANES",)
 CAPABILITIES = {"bridges": "liquid bridges", "carried_liquid": "liquid carried by grains", "rolling_resistance": "couples against rolling",
                 "own_inertia": "moments of inertia other than a sphere's",
                 "creeping_friction": "friction of boxes without a spring", "periodic_fluid": "a fluid in a periodic box"}
-DECK_NOTE = ("Written by dembark; SI units. Numbers with a comment are parameters. Numbers without one, the packing and the meshes are "
-             "computed from them: do not change these by hand. To change a parameter, write the deck anew with 'dembark deck --set'.")
+DECK_NOTE = ("Written by dembark; SI units. Numbers with a comment are parameters. Others, the packing and the meshes were computed from "
+             "them and do not follow a change by hand: write the deck anew with 'dembark deck --set'.")
 
 
 @dataclass(frozen=True)

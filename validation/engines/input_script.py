@@ -13,6 +13,9 @@ from dembark.common.choices import Value
 
 from .base import DECK_NOTE, DeckNumber, Engine, end_with_parent, texts
 
+# Above the numbers that no command reads.
+UNREAD_NOTE = "No command below reads these: they are worked into the commands and the numbers above, and a change here does nothing."
+
 
 @cache
 def _environment(folders: tuple[str, ...]) -> jinja2.Environment:
@@ -31,12 +34,14 @@ class InputScript(Engine):
         environment = _environment(tuple(map(str, folders)))
         # Tables are for the template; a variable holds one number.
         given = texts({name: number.value for name, number in numbers.items() if not isinstance(number.value, tuple)})
-        # Strings, not `index`: -var of a number that others were computed from would change it alone, or nothing at all. So both engines
-        # refuse it.
-        width = max((len(name) for name in given), default=0)
-        lines = [f"variable {name:{width}} string {text}" + (f" # {numbers[name].meaning}" if numbers[name].meaning else "")
-                 for name, text in given.items()]
         body = environment.from_string(source).render({"engine": cls.facts.name} | {name: number.value for name, number in numbers.items()})
+        # Strings, not `index`: -var of a number that others were computed from would change it alone, or nothing at all. So both engines
+        # refuse it, also of one that only the template reads.
+        width, read = max((len(name) for name in given), default=0), _read(body, given)
+        lines = [f"variable {name:{width}} string {given[name]}" + (f" # {numbers[name].meaning}" if numbers[name].meaning else "")
+                 for name in sorted(given, key=lambda name: name not in read)]
+        if len(read) < len(given):
+            lines.insert(len(read), f"# {UNREAD_NOTE}")
         # The opening comment of the source stays on top.
         top = re.match(r"(?:#.*\n)*", source)
         head = top.group() if top else ""
@@ -48,6 +53,14 @@ class InputScript(Engine):
         launcher = [*self.launcher(ranks), *end_with_parent("KILL")] if ranks > 1 else []
         variables = (word for key, value in texts(values).items() for word in ("-var", key, value))
         return [*launcher, str(self.executable), "-in", str(deck), "-log", "none", *variables]
+
+
+def _read(body: str, names: Iterable[str]) -> set[str]:
+    """Those of `names` whose variable a list of commands reads; all where the engine reads more files."""
+    code = "\n".join(line.partition("#")[0] for line in body.splitlines())
+    if re.search(r"^\s*(include\s|jump\s+(?!SELF\b))", code, re.MULTILINE):
+        return set(names)
+    return {name for name in names if re.search(rf"\${{{name}}}|\bv_{name}\b", code)}
 
 
 def row(numbers: Iterable[float]) -> str:
