@@ -28,7 +28,7 @@ def body(
     spheres: Annotated[int | None, typer.Option(min=2, help=(
         "So many spheres of different sizes, which touch the surface from inside."))] = None,
     along: Annotated[int | None, typer.Option(min=1, max=200, help=(
-        "Or equal spheres on a cubic lattice: so many along the longest side."))] = None,
+        "Or equal spheres on a cubic lattice along x, y and z: so many along the longest side of the box around the body."))] = None,
     spacing: Annotated[float | None, typer.Option(parser=positive("m", "--spacing"), metavar="TEXT", help=(
         "Or equal spheres at this distance: '2 mm'."))] = None,
     unit: Annotated[str, typer.Option(help=f"Unit of the file: {', '.join(STL_UNITS)}.")] = "m",
@@ -60,9 +60,12 @@ def body(
         called, density * mesh.mass.volume, tuple((a, b, c) for a, b, c in inertia.tolist()), at or (x, y, z),
         tuple((a, b, c, r) for a, b, c, r in rows), bodies.is_principal(inertia), spheres is None)
     quality = bodies.fit(mesh, filled)
+    texts = {out / file: text for file, text in engines.engine_class(engine).body_files(made).items()}
+    if there := [path for path in texts if path.exists()]:
+        raise DembarkError(f"{there[0]} is there already", "", "name another folder, or another --name")
     try:
         out.mkdir(parents=True, exist_ok=True)
-        files = [write_atomic(out / file, text.encode()) for file, text in engines.engine_class(engine).body_files(made).items()]
+        files = [write_atomic(path, text.encode()) for path, text in texts.items()]
     except OSError as error:
         raise DembarkError(f"cannot write to {out}", error.strerror or str(error)) from None
     print("\n".join([*_lines(given, quality, made), *(f"written: {file}" for file in files)]))
@@ -82,10 +85,12 @@ def _lines(given: bodies.Mesh, fit: bodies.Fit, made: engines.RigidBody) -> list
     """What the body is, and how well the spheres fit it."""
     few, most = min(radius for *_, radius in made.spheres), max(radius for *_, radius in made.spheres)
     sizes = f"radius {most:.4g} m" if most == few else f"radii {few:.4g} to {most:.4g} m"
+    loose = f"note: the surface encloses {given.pieces} pieces apart from each other, which move as one rigid body"
     return [
+        *([loose] if given.pieces > 1 else []),
         f"surface: {len(given.faces)} triangles, closed; volume {given.mass.volume:.9g} m3",
         f"mass {made.mass:.9g} kg; centre of mass in the file {' '.join(f'{x:.9g}' for x in given.mass.centre)} m",
         f"inertia (kg m2) xx yy zz xy xz yz: {' '.join(f'{x:.6g}' for x in made.moments)}",
-        f"{len(made.spheres)} spheres, {sizes}; volume of their union {100.0 * (fit.volume_ratio - 1.0):+.1f} % of the body's",
+        f"{len(made.spheres)} spheres, {sizes}; volume of their union {100.0 * fit.volume_ratio:.1f} % of the body's",
         f"the surface is up to {fit.short:.3g} m outside of them (rms {fit.rms:.3g} m), they reach up to {fit.beyond:.3g} m out of it",
     ]

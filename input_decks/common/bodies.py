@@ -98,6 +98,18 @@ class Mesh:
         """Of the inside."""
         return mass_properties(self.triangles)
 
+    @cached_property
+    def of_part(self) -> Integers:
+        """The part of the surface, by number, that each triangle (t,) belongs to: parts have no corner in common."""
+        count, (a, b, c) = len(self.points), self.faces.T
+        joined = coo_matrix((np.ones(2 * len(a)), (np.append(a, b), np.append(b, c))), shape=(count, count))
+        return np.asarray(connected_components(joined, directed=False)[1][a], np.int64)
+
+    @property
+    def pieces(self) -> int:
+        """How many bodies it encloses that are apart from each other; cavities are none."""
+        return sum(mass_properties(self.triangles[self.of_part == k]).volume > 0.0 for k in range(self.of_part.max() + 1))
+
     def turned(self) -> Mesh:
         """With the centre of mass at the origin and the principal axes along x, y and z, in ascending order of the moments. A body whose
         axes are along them already is turned by right angles only."""
@@ -145,7 +157,7 @@ def closed(triangles: Array, name: str) -> Mesh:
     if (same_way := np.bincount(place.ravel(), along) != 1.0).any():
         raise _refusal(name, f"triangles at {same_way.sum()} edges are turned against their neighbours", "let all normals point outwards")
     mesh = Mesh(points, faces)
-    _check_parts(mesh, unique, name)
+    _check_parts(mesh, name)
     if (crossing := _crossings(mesh, unique)):
         raise _refusal(name, f"the surface cuts or touches itself at {crossing} edges", "unite its parts")
     return mesh
@@ -166,15 +178,12 @@ def _joined(triangles: Array) -> tuple[Array, Integers]:
     return kept, np.asarray(group[places.ravel()].reshape(-1, 3), np.int64)
 
 
-def _check_parts(mesh: Mesh, edges: Integers, name: str) -> None:
+def _check_parts(mesh: Mesh, name: str) -> None:
     """DembarkError when a part that is not joined to others has normals that do not fit to where it lies: outwards around material,
     inwards around a cavity in it."""
-    count = len(mesh.points)
-    number, part = connected_components(coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)), directed=False)
-    of_face = part[mesh.faces[:, 0]]
-    for k in range(number):
-        own = mesh.triangles[of_face == k]
-        turns = round(_turns(mesh.triangles[of_face != k], own[0, 0]))
+    for k in range(mesh.of_part.max() + 1):
+        own = mesh.triangles[mesh.of_part == k]
+        turns = round(_turns(mesh.triangles[mesh.of_part != k], own[0, 0]))
         volume = mass_properties(own).volume
         if turns == 0 and not volume > 0.0:
             raise _refusal(name, "it is inside out", "let all normals point outwards")

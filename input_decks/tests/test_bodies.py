@@ -228,14 +228,45 @@ def test_the_command_writes_what_each_engine_takes(tmp_path, capsys):
     masses = (out / "my_part.mol").read_text().split("Masses\n\n")[1].split("\n\n")[0]
     assert sum(float(line.split()[1]) for line in masses.splitlines()) == pytest.approx(0.0125)
     # Without --at the centre of mass is where the file has it; numbers are plain.
+    common[5] = str(out := tmp_path / "other")
     for name in engines.names():
         assert cli.main([*common, "--engine", name, "--spheres", "6"]) == 0
     centre = re.search(r"CENTRE = Vector3\((.*)\)", (out / "my_part_body.py").read_text())
     np.testing.assert_allclose(list(map(float, centre[1].split(","))), [0.011, 0.007, 0.007], rtol=1e-6)
     assert not any("np." in one.read_text() for one in out.iterdir())
     # Particles of fix sph/body need principal axes and a lattice.
+    common[5] = str(out := tmp_path / "lattice")
     assert cli.main([*common, "--engine", "liggghts", "--spacing", "5 mm", "--principal"]) == 0
     assert "inertia" in (out / "my_part-sph.in").read_text()
+
+
+def test_the_command_says_how_well_the_spheres_fit_and_overwrites_nothing(tmp_path, capsys):
+    """Spheres on a lattice fill pi/6 of a cube."""
+    write(tmp_path / "cube.stl", CUBE)
+    words = ["body", str(tmp_path / "cube.stl"), "--density", "1000", "--engine", "yade", "--along", "4", "--out", str(tmp_path / "out")]
+    assert cli.main(words) == 0
+    said = capsys.readouterr().out
+    assert 100 * math.pi / 6 == pytest.approx(float(re.search(r"volume of their union (\S+) % of the body's", said)[1]), abs=0.5)
+    assert "pieces" not in said
+    module = (tmp_path / "out/cube_body.py").read_text()
+    assert "import cube_body\n" in module and "cube_body.add()" in module and "{" not in module.partition("MASS")[0]
+    (tmp_path / "out/cube_body.py").write_text("mine")
+    assert cli.main(words) == 2
+    assert "cube_body.py is there already, name another folder, or another --name" in capsys.readouterr().err
+    assert (tmp_path / "out/cube_body.py").read_text() == "mine"
+
+
+def test_pieces_apart_from_each_other_are_noted(tmp_path, capsys):
+    write(tmp_path / "two.stl", np.concatenate([cells((0, 0, 0)), cells((3, 0, 0))]))
+    words = ["--density", "1000", "--engine", "yade", "--along", "8", "--out", str(tmp_path / "out")]
+    assert cli.main(["body", str(tmp_path / "two.stl"), *words]) == 0
+    assert "note: the surface encloses 2 pieces apart from each other, which move as one rigid body" in capsys.readouterr().out
+    assert bodies.closed(CLOSED_FORMS["cavity"][0], "cavity").pieces == 1
+
+
+def test_a_surface_that_is_not_there_does_not_exist(tmp_path, capsys):
+    assert cli.main(["body", "absent.stl", "--density", "1", "--engine", "yade", "--along", "8", "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == "dembark: absent.stl does not exist\n"
 
 
 @pytest.mark.parametrize(("words", "said"), [

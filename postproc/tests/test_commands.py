@@ -275,7 +275,7 @@ MISTAKES = [
     (["walls", "run", "--wall", "base:cylinder:radius=1:around=none"], "around"),
     (["walls", "run", "--wall", "side:cylinder:radius=1"], "walls in it: base"),
     (["walls", "run", "--wall", "base:plane", "--wall", "base:plane"], "given twice"),
-    (["walls", "run", "--wall", "base:mesh:file=none.stl"], "file 'none.stl' cannot be read"),
+    (["walls", "run", "--wall", "base:mesh:file=none.stl"], "none.stl does not exist"),
     (["walls", "run", "--wall", "base:mesh:file=run/run.json"], "STL"),
     (["walls", "run", "--wall", "stone:inclusion:ids=1-x"], "1,5-9"),
     (["walls", "run", "--wall", "stone:inclusion:ids=999"], "grain 999"),

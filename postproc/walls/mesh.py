@@ -39,6 +39,8 @@ def read_stl(path: str | Path, precision: float = 0.0) -> Surface:
     that differ by no more than `precision` (in the file's unit), are left out.
     """
     path = Path(path)
+    if not path.exists():
+        raise DumpError(f"{path} does not exist")
     try:
         triangles, solids, names, _, _ = _dumps.read_stl(str(path), precision)
     except ValueError as error:

@@ -18,8 +18,10 @@ _FEATURES = {"VTK": "VTKRecorder", "QT5": "yade.qt, SnapshotEngine", "GTS": "pac
 
 _BODY = '''"""{about}
 
-    sys.path.append(folder of this file)
-    number, members = {{this module}}.add()
+    import sys
+    sys.path.append("folder of this file")
+    import {name}_body
+    number, members = {name}_body.add()
 """
 
 from yade import Body, Matrix3, O, Quaternion, Vector3, utils
@@ -64,7 +66,7 @@ class Yade(Engine):
     def body_files(cls, body: RigidBody) -> dict[str, str]:
         """See Engine: a module whose function `add` makes the clump."""
         rows = "".join(f"    {sphere!r},\n" for sphere in body.spheres)
-        text = _BODY.format(about=body.about(), mass=body.mass, centre=body.centre, inertia=body.inertia, rows=rows)
+        text = _BODY.format(about=body.about(), name=body.name, mass=body.mass, centre=body.centre, inertia=body.inertia, rows=rows)
         return {f"{body.name}_body.py": text}
 
     @property
