@@ -15,6 +15,7 @@ from dembark.validation.case import deck
 from dembark.validation.case.folders import discover, find, package_root
 from dembark.validation.case.model import Case, Parameter
 from dembark.validation.case.resolve import merged, portable
+from dembark.validation.cli import main
 from dembark.validation.engines.input_script import UNREAD_NOTE
 
 SCENE = Path(__file__).resolve().parents[2] / "plugins/yade/python/dembark/scene.py"
@@ -114,3 +115,10 @@ def test_every_text_that_a_deck_includes_is_an_input(name):
 def test_what_a_setup_shares_with_the_measurement_is_an_input(name, module):
     content = (package_root().parent / module).read_bytes()
     assert hashlib.sha256(content).hexdigest() in deck.sources(find(name), "liggghts").values()
+
+
+def test_a_deck_of_several_packings_says_that_it_has_one(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    words = ["deck", "bulk_density", "--engine", "lammps", "--set", "grain_count=100", "--set", "seed=7"]
+    assert main([*words, "--out", str(tmp_path / "one")]) == 0 and "note" not in capsys.readouterr().out
+    assert main([*words, "--set", "replicas=3", "--out", str(tmp_path / "other")]) == 0
+    assert "note: a deck has one packing, here that of seed 7" in capsys.readouterr().out

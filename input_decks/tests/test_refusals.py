@@ -31,6 +31,8 @@ from dembark.validation.case.resolve import resolve
     *((case, {"liquid_content": 0.01, "bridge_volume": 8e-11}, "set liquid_content or bridge_volume, not both")
       for case in ("plug_flow", "silo")),
     ("vibro_sieve", {"motion": "none"}, r"motion must be harmonic, motion_direction z, with motion = none, motion_direction = z in case"),
+    *((case, {time: 1e300}, r"would have 1e30\d steps, it may have 1e\+15, take shorter times")
+      for case, time in (("silo", "measure_time"), ("single_contact", "duration"))),
     ("silo", {"bridge_volume": 1e-3}, "a bridge is larger than the grains"), ("silo", {"surface_tension": 72.0}, "surface_tension"),
     ("liquid_exchange", {"liquid_share": "fraction", "liquid_share_factor": 1.5}, "liquid_share_factor"),
     ("log_pair", {"velocity_1": -1.0}, "velocity_1"), ("log_pair", {"offset": 0.2}, "offset"),

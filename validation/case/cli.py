@@ -54,6 +54,8 @@ def deck(
     except OSError as error:
         raise DembarkError(f"cannot write to {out}", error.strerror or str(error)) from None
     facts = engines.facts(engine)
+    if int(values.get("replicas") or 1) > 1 and "replicas" in settings(change or ()):
+        print(f"note: a deck has one packing, here that of seed {values.get('seed')}; write one with another seed for each further packing")
     print(f"{out / facts.deck}: {setup.steps} steps of {setup.time_step:.6g} s. Run it in its folder: {facts.by_hand}")
 
 

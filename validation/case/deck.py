@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from .model import Case
 
 PACKING = "packing.data"
+# Years on any machine; beyond it not every number of a step is exact in double precision.
+MOST_STEPS = 1e15
 _INCLUDED = re.compile(r"{%-?\s*include\s+[\"'](.+?)[\"']")
 
 
@@ -76,7 +78,15 @@ def _setup_module(path: Path) -> ModuleType:
 
 def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
     """Derived numbers, packing and meshes of a run with the parameters `values`; DembarkError with file and line when they cannot be
-    made."""
+    made, or when the run would never end."""
+    setup = _prepared(case, values)
+    if setup.steps > MOST_STEPS:
+        raise DembarkError(f"a run of case {case.name} would have 1e{math.log10(setup.steps):.0f} steps",
+                           f"it may have {MOST_STEPS:.0e}", "take shorter times")
+    return setup
+
+
+def _prepared(case: Case, values: Mapping[str, Value]) -> Setup:
     from dembark.input_decks.common.packing import MOST_SITES
     from dembark.input_decks.common.setup import Setup
 

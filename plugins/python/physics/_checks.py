@@ -28,7 +28,9 @@ def numbers(name: str, value: ArrayLike, unit: str, *, low: float = -np.inf, hig
             infinite: bool = False) -> NDArray[np.float64]:
     """`value` as float64, or ValueError naming the argument, its unit and what would be right."""
     try:
-        if np.asarray(value).dtype.kind in "bSU":  # of which float64 would make numbers
+        given = np.asarray(value)
+        # Of these float64 would make numbers.
+        if given.dtype.kind in "bSU" or (given.dtype.kind == "O" and any(one is None for one in given.flat)):
             raise TypeError
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -43,6 +45,15 @@ def numbers(name: str, value: ArrayLike, unit: str, *, low: float = -np.inf, hig
         bound = f"> {low:g}" if low_open else f">= {low:g}" if high == np.inf else f"between {low:g} and {high:g}"
         raise ValueError(f"{name} must be {f'{bound} {unit}'.rstrip()}{'' if infinite else ' and finite'}, not {first:g}")
     return array
+
+
+def together(**arrays: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """The arguments of these names, broadcast against each other; ValueError naming them with their shapes where they do not fit."""
+    try:
+        return list(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items() if array.shape)
+        raise ValueError(f"the shapes of {shapes} do not fit together: they must be equal or broadcast") from None
 
 
 def vectors(name: str, value: ArrayLike, unit: str, n: int, dimension: int) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import contact_number, numbers
+from dembark.physics._checks import contact_number, numbers, together
 
 CAPILLARY_MODELS: tuple[str, ...] = tuple(_physics.capillary_models())
 
@@ -34,14 +34,15 @@ def bridge_radius(radius_i: ArrayLike, radius_j: ArrayLike) -> NDArray[np.float6
 def _radii(radius_i: ArrayLike, radius_j: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     a = numbers("radius_i", radius_i, "m", low=0.0, low_open=True, infinite=True)
     b = numbers("radius_j", radius_j, "m", low=0.0, low_open=True, infinite=True)
+    together(radius_i=a, radius_j=b)
     if (np.isinf(a) & np.isinf(b)).any():
         raise ValueError("radius_i and radius_j must not both be infinite: two walls hold no pendular bridge")
     return a, b
 
 
 def _by_angle(contact_angle: NDArray[np.float64], model: str, call: Callable[..., NDArray[np.float64]],
-              *arrays: NDArray[np.float64]) -> NDArray[np.float64] | float:
-    angle, *columns = np.broadcast_arrays(contact_angle, *arrays)
+              **arrays: NDArray[np.float64]) -> NDArray[np.float64] | float:
+    angle, *columns = together(contact_angle=contact_angle, **arrays)
     shape = angle.shape
     angle = angle.ravel()
     columns = [np.ascontiguousarray(c.ravel()) for c in columns]
@@ -76,8 +77,9 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
     """
     check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
-    return _by_angle(angle, model, _physics.BridgeForce.force, *_radii(radius_i, radius_j), numbers("gap", gap, "m", infinite=True),
-                     numbers("volume", volume, "m^3", low=0.0), contact_number("surface_tension", surface_tension))
+    a, b = _radii(radius_i, radius_j)
+    return _by_angle(angle, model, _physics.BridgeForce.force, radius_i=a, radius_j=b, gap=numbers("gap", gap, "m", infinite=True),
+                     volume=numbers("volume", volume, "m^3", low=0.0), surface_tension=contact_number("surface_tension", surface_tension))
 
 
 def rupture_distance(volume: ArrayLike, contact_angle: ArrayLike, radius_i: ArrayLike, radius_j: ArrayLike, *,
@@ -89,5 +91,6 @@ def rupture_distance(volume: ArrayLike, contact_angle: ArrayLike, radius_i: Arra
     """
     check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
-    return _by_angle(angle, model, _physics.BridgeForce.rupture_distance, *_radii(radius_i, radius_j),
-                     numbers("volume", volume, "m^3", low=0.0))
+    a, b = _radii(radius_i, radius_j)
+    return _by_angle(angle, model, _physics.BridgeForce.rupture_distance, radius_i=a, radius_j=b,
+                     volume=numbers("volume", volume, "m^3", low=0.0))

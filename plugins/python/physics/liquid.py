@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import numbers
+from dembark.physics._checks import numbers, together
 
 LIQUID_SHARES: tuple[str, ...] = tuple(_physics.liquid_shares())
 LIQUID_RETURNS: tuple[str, ...] = tuple(_physics.liquid_returns())
@@ -24,8 +24,8 @@ class LiquidBridge(NamedTuple):
     back_j: NDArray[np.float64] | float
 
 
-def _columns(*arrays: NDArray[np.float64]) -> tuple[tuple[int, ...], list[NDArray[np.float64]]]:
-    columns = np.broadcast_arrays(*arrays)
+def _columns(**arrays: NDArray[np.float64]) -> tuple[tuple[int, ...], list[NDArray[np.float64]]]:
+    columns = together(**arrays)
     return columns[0].shape, [np.ascontiguousarray(c.ravel()) for c in columns]
 
 
@@ -48,8 +48,8 @@ def liquid_share(radius: ArrayLike, other: ArrayLike, *, share: str = "cap", fac
     """
     if share not in LIQUID_SHARES:
         raise ValueError(f"share {share!r} is unknown; it can be {', '.join(LIQUID_SHARES)}")
-    shape, (own, others) = _columns(numbers("radius", radius, "m", low=0.0, low_open=True),
-                                    numbers("other", other, "m", low=0.0, low_open=True, infinite=True))
+    shape, (own, others) = _columns(radius=numbers("radius", radius, "m", low=0.0, low_open=True),
+                                    other=numbers("other", other, "m", low=0.0, low_open=True, infinite=True))
     return _shaped(_physics.liquid_share(own, others, share, float(factor)), shape)
 
 
@@ -61,7 +61,7 @@ def liquid_grant(liquid: ArrayLike, demand: ArrayLike) -> NDArray[np.float64] | 
     >>> liquid_grant(6e-12, [0.5, 3.0]).tolist()
     [6e-12, 2e-12]
     """
-    shape, columns = _columns(numbers("liquid", liquid, "m^3", low=0.0), numbers("demand", demand, "", low=0.0))
+    shape, columns = _columns(liquid=numbers("liquid", liquid, "m^3", low=0.0), demand=numbers("demand", demand, "", low=0.0))
     return _shaped(_physics.liquid_grant(*columns), shape)
 
 
@@ -85,10 +85,10 @@ def liquid_bridge(given_i: ArrayLike, given_j: ArrayLike, radius_i: ArrayLike, r
     if split not in LIQUID_RETURNS:
         raise ValueError(f"split {split!r} is unknown; it can be {', '.join(LIQUID_RETURNS)}")
     shape, (volumes_i, volumes_j, radii_i, radii_j, walls, limits) = _columns(
-        numbers("given_i", given_i, "m^3", low=0.0), numbers("given_j", given_j, "m^3", low=0.0),
-        numbers("radius_i", radius_i, "m", low=0.0, low_open=True),
-        numbers("radius_j", radius_j, "m", low=0.0, low_open=True, infinite=True),
-        numbers("wall_part", wall_part, "", low=0.0, high=1.0),
-        numbers("largest", largest, "m^3", low=0.0, low_open=True, infinite=True))
+        given_i=numbers("given_i", given_i, "m^3", low=0.0), given_j=numbers("given_j", given_j, "m^3", low=0.0),
+        radius_i=numbers("radius_i", radius_i, "m", low=0.0, low_open=True),
+        radius_j=numbers("radius_j", radius_j, "m", low=0.0, low_open=True, infinite=True),
+        wall_part=numbers("wall_part", wall_part, "", low=0.0, high=1.0),
+        largest=numbers("largest", largest, "m^3", low=0.0, low_open=True, infinite=True))
     parts = _physics.liquid_bridge(volumes_i, volumes_j, radii_i, radii_j, walls, limits, LIQUID_RETURNS.index(split))
     return LiquidBridge(*(_shaped(part, shape) for part in parts))

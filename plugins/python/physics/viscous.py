@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dembark import _physics
-from dembark.physics._checks import numbers
+from dembark.physics._checks import numbers, together
 from dembark.physics.capillary import bridge_radius
 
 
@@ -23,6 +23,7 @@ def check_viscous(viscosity: ArrayLike, minimum_gap: ArrayLike) -> tuple[NDArray
     """Both as arrays; ValueError for a viscosity without a gap to cut off at."""
     eta = numbers("viscosity", viscosity, "Pa s", low=0.0)
     floor = numbers("minimum_gap", minimum_gap, "m", low=0.0)
+    eta, floor = together(viscosity=eta, minimum_gap=floor)
     if ((eta > 0.0) & (floor == 0.0)).any():
         raise ValueError("minimum_gap must be > 0 m with a viscosity: viscous forces diverge as the gap closes; the roughness of the "
                          "surfaces is usual")
@@ -51,8 +52,8 @@ def viscous_resistance(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike,
     True
     """
     eta, floor = check_viscous(viscosity, minimum_gap)
-    columns = np.broadcast_arrays(bridge_radius(radius_i, radius_j), numbers("gap", gap, "m", infinite=True),
-                                  numbers("volume", volume, "m^3", low=0.0), eta, floor)
+    columns = together(radius_i=bridge_radius(radius_i, radius_j), gap=numbers("gap", gap, "m", infinite=True),
+                       volume=numbers("volume", volume, "m^3", low=0.0), viscosity=eta, minimum_gap=floor)
     shape = columns[0].shape
     parts = _physics.viscous_resistance(*(np.ascontiguousarray(c.ravel()) for c in columns))
     return ViscousResistance(*(part.reshape(shape) if shape else float(part[0]) for part in parts))

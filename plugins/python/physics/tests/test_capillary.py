@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dembark import physics
 from dembark.physics import CAPILLARY_MODELS, capillary_force, rupture_distance
 
 R, GAMMA = 1e-3, 0.072
@@ -140,3 +141,19 @@ def test_arguments_that_are_no_numbers():
         capillary_force(**GOOD | {"volume": "a drop"})
     with pytest.raises(ValueError, match="shape"):
         capillary_force(**GOOD | {"gap": [0.0, 1.0], "volume": [1.0, 2.0, 3.0]})
+
+
+@pytest.mark.parametrize("call", [
+    lambda a, b: physics.capillary_force(a, b, 0.0, 1e-11, 0.07, 0.0), lambda a, b: physics.capillary_force(1e-3, a, b, 1e-11, 0.07, 0.0),
+    lambda a, b: physics.rupture_distance(a, 0.0, b, 1e-3), lambda a, b: physics.viscous_resistance(a, 1e-3, b, 1e-11, 1e-3, 1e-6),
+    physics.liquid_share, physics.liquid_grant,
+    lambda a, b: physics.liquid_bridge(a, b, 1e-3, 1e-3)])
+def test_shapes_that_do_not_fit_are_named(call):
+    with pytest.raises(ValueError, match=r"the shapes of \w+ \([23],\), \w+ \([23],\) do not fit together: they must be equal"):
+        call([1e-3, 2e-3], [1e-3, 2e-3, 3e-3])
+
+
+@pytest.mark.parametrize("radius", [None, [1e-3, None]])
+def test_none_is_no_number(radius):
+    with pytest.raises(TypeError, match="radius_i must be a number or an array of numbers"):
+        physics.capillary_force(radius, 1e-3, 0.0, 1e-11, 0.07, 0.0)
