@@ -94,6 +94,15 @@ def test_numbers_that_no_command_reads_stand_below_a_line_that_says_so(case: str
     assert {name for name, value in values.items() if value is not None} - {"replicas"} <= {*read, *unread}
 
 
+@pytest.mark.parametrize(("source", "marked"), [
+    ("print ${size}\n# ${count}\n", ["count"]), ("variable n equal 2*v_count\njump SELF end\n", ["size"]), ("print ${size}${count}\n", []),
+    ("print ${size}\ninclude more.in\n", []), ("jump more.in\n", [])])
+def test_what_another_file_may_read_is_not_marked(source: str, marked: list[str]) -> None:
+    numbers = {name: engines.DeckNumber(2.0, "m") for name in ("size", "count")}
+    _, _, below = engines.engine_class("lammps").deck_text(source, numbers, []).partition(UNREAD_NOTE)
+    assert re.findall(r"^variable +(\w+) +string", below, re.MULTILINE) == marked
+
+
 @pytest.mark.parametrize("name", [one.name for one in discover().values() if {"liggghts", "lammps"} & set(one.engines)])
 def test_every_text_that_a_deck_includes_is_an_input(name):
     """Otherwise runs made with an older text would be kept."""

@@ -196,7 +196,7 @@ def test_a_deck_without_numbers_says_where_they_come_from(yade):
 def test_a_deck_takes_the_words_of_restarts_only(yade):
     deck = script(yade, "words", "p = dembark.parameters(size=0.1)\nprint('went on', dembark.options())\n")
     assert_one_line(yade(deck, "size=0.2"), ("argument 'size=0.2'", "write the deck anew"))
-    for word in ("restart_evry=5", "diameter=0.2", "yes"):
+    for word in ("restart_evry=5", "diameter=0.2", "resume"):
         assert_one_line(yade(deck, word), (f"argument '{word}' is not known to a deck", "restart_every=<steps> and resume=yes|no"))
     assert "went on (5, False)" in yade(deck, "restart_every=5", "resume=no").stdout
 

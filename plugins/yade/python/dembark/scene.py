@@ -33,14 +33,13 @@ O = Omega()
 
 def parameters(**numbers):
     """The numbers of a run by name; 'dembark deck' writes them into the deck. A word behind the script is refused, but for those of
-    `options`: from a number others were computed."""
+    restarts; one that would change a number, too, for others were computed from it."""
     if not numbers:
         fail("this deck has no numbers; write it with 'dembark deck CASE --engine yade --out FOLDER'")
     for word in sys.argv[1:]:
-        name = word.partition("=")[0]
-        if name in numbers:
+        if word.partition("=")[0] in numbers:
             fail(f"argument '{word}': other numbers of this deck were computed from it; write the deck anew with 'dembark deck --set'")
-        if name not in WORDS:
+        if not word.startswith(WORDS):
             fail(f"argument '{word}' is not known to a deck; it takes restart_every=<steps> and resume=yes|no")
     return SimpleNamespace(**numbers)
 

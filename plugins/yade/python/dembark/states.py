@@ -12,8 +12,8 @@ from yade import DembarkStates, IntegrationMonitor, NewtonIntegrator, Omega, Sph
 from yade.dembark.report import announce, fail, finish, monitor
 
 O = Omega()
-# What may stand behind the script of a deck.
-WORDS = ("restart_every", "resume")
+# How a word behind the script of a deck begins.
+WORDS = ("restart_every=", "resume=")
 
 
 @cache
