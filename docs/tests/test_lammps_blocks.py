@@ -62,7 +62,10 @@ timestep        1e-5
 """
 PAIR = "pair_style dembark/granular"
 COEFFICIENTS = ("pair_coeff * * youngs_modulus 5e6 poissons_ratio 0.3 restitution 0.5 static_friction 0.5 kinetic_friction 0.4 "
-                "critical_slip_distance 1e-5 rolling_friction 0.1 bridge_volume 8e-11 contact_angle 0.3")
+                "critical_slip_distance 1e-5")
+# Of laws that a pair style may have: the words that choose one, and its coefficients.
+MORE = {r"rolling_resistance (?!off)": "rolling_friction 0.1", r"capillary_model|cohesion bridge": "contact_angle 0.3",
+        r"(capillary_model|cohesion bridge)(?!.*carried_liquid on)": "bridge_volume 8e-11"}
 
 
 def run(text: str, folder: Path) -> str:
@@ -104,8 +107,7 @@ def test_fragment(block: Block, tmp_path: Path) -> None:
     rest = [line for line in lines if not line.startswith("pair_style")]
     (tmp_path / "trough.stl").write_text(TROUGH)
     for pair in pairs:
-        # What grains lend to bridges is not told of pairs.
-        coefficients = COEFFICIENTS.replace("bridge_volume 8e-11 ", "") if "carried_liquid on" in pair else COEFFICIENTS
+        coefficients = " ".join([COEFFICIENTS, *(more for words, more in MORE.items() if re.search(words, pair))])
         deck = "\n".join([HEAD, pair, coefficients, "timestep 1e-6", "fix motion all nve/sphere", *rest, "run 100", ""])
         assert "Loop time" in run(deck, tmp_path)
 

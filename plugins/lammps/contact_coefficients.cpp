@@ -1,6 +1,7 @@
 #include "contact_coefficients.h"
 
 #include <algorithm>
+#include <set>
 
 #include "atom.h"
 #include "error.h"
@@ -82,8 +83,10 @@ void ContactCoefficients::settings(int narg, char** arg) {
   keywords.insert(keywords.end(), {"cohesion", "capillary_model", "viscous_liquid", "carried_liquid", "tangential_damping", "limit_force"});
   for (const dembark::Parameter& each : dembark::contact_parameters)
     if (is_keyword(each)) keywords.emplace_back(each.name);
+  std::set<std::string> seen;
   for (int k = 0; k < narg;) {
     const std::string keyword = arg[k++];
+    if (!seen.insert(keyword).second) fail(keyword + " is given twice");
     const auto word = [&]() -> const char* {
       if (k == narg) fail(keyword + " needs a value");
       return arg[k++];
@@ -119,11 +122,14 @@ void ContactCoefficients::settings(int narg, char** arg) {
   if (wet && dry) fail("capillary_model is for the cohesion bridge");
   if (wet) options_.cohesion = dembark::CohesionLaw::bridge;
   const bool bridges = options_.cohesion == dembark::CohesionLaw::bridge;
-  if (!bridges && (!std::isnan(global(ContactNumber::surface_tension)) || options_.viscous))
-    fail("surface_tension and viscous_liquid need a capillary_model");
+  for (std::size_t k = 0; k < global_.size(); ++k) refuse_switched_off(dembark::contact_parameters[k], global_[k]);
   if (!bridges && options_.carried_liquid) fail("carried_liquid needs a capillary_model");
   if (bridges && std::isnan(global(ContactNumber::surface_tension)))
     fail("capillary_model needs surface_tension S with S (N/m) >= 0 and finite");
+}
+
+void ContactCoefficients::refuse_switched_off(const dembark::Parameter& p, double value) const {
+  if (const std::string line = dembark::switched_off(p, value, options_); !line.empty()) fail(line);
 }
 
 std::string ContactCoefficients::given() const {
@@ -145,6 +151,8 @@ std::vector<std::array<int, 2>> ContactCoefficients::coeff(int narg, char** arg)
   for (int i = low[0]; i <= high[0]; ++i)
     for (int j = std::max(low[1], i); j <= high[1]; ++j) pairs.push_back({i, j});
   if (pairs.empty()) fail(std::string("pair_coeff ") + arg[0] + " " + arg[1] + " names no pair of types; the smaller one comes first");
+  const std::string line = std::string("pair_coeff ") + arg[0] + " " + arg[1] + ": ";
+  std::set<std::string> seen;
   for (int k = 2; k < narg; k += 2) {
     const std::string name = arg[k];
     const dembark::Parameter* const known = dembark::parameter(name);
@@ -156,9 +164,12 @@ std::vector<std::array<int, 2>> ContactCoefficients::coeff(int narg, char** arg)
       names.emplace_back("largest_radius");
       fail("pair_coeff knows no '" + name + "'; it knows " + dembark::names_text(names));
     }
-    if (k + 1 == narg) fail("pair_coeff: " + name + " needs a value");
-    const double value = number("pair_coeff: " + name, arg[k + 1]);
-    if (radius && !(value >= 0.0 && value < INFINITY)) fail("largest_radius must be >= 0 and finite");
+    if (!seen.insert(name).second) fail(line + name + " is given twice");
+    if (k + 1 == narg) fail(line + name + " needs a value");
+    const double value = number(line + name, arg[k + 1]);
+    if (radius && !(value >= 0.0 && value < INFINITY)) fail(line + "largest_radius must be >= 0 and finite");
+    if (known && !known->allows(value)) fail(line + dembark::wrong_value(*known, name, value));
+    if (known) refuse_switched_off(*known, value);
     if (one_pair && (radius || known->scope == dembark::Scope::type))
       fail(name + " belongs to one type; give it with pair_coeff " + arg[0] + " " + arg[0] + " and pair_coeff " + arg[1] + " " + arg[1]);
     for (const auto& [i, j] : pairs)
@@ -185,8 +196,11 @@ void ContactCoefficients::begin() {
     for (int j = 1; j <= count; ++j) parameters_(i, j) = all;
 }
 
-void ContactCoefficients::complete(int i, int j) {
-  parameters_(i, j) = parameters_(j, i) = dembark::read_contact(options_, Source(*this, i, j));
+void ContactCoefficients::complete(int i, int j, double radius) {
+  const Source source(*this, i, j);
+  parameters_(i, j) = parameters_(j, i) = dembark::read_contact(options_, source);
+  const double volume = parameters_(i, j).cohesion.liquid.bridge_volume;
+  if (const std::string line = dembark::wrong_bridge_volume("bridge_volume", volume, radius); !line.empty()) source.wrong(line);
   complete_(i, j) = complete_(j, i) = 1;
 }
 

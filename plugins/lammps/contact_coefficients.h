@@ -38,6 +38,7 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
   /// What pair_style says of all pairs.
   dembark::ContactParameters common() const;
   class Source;
+  void refuse_switched_off(const dembark::Parameter& p, double value) const;
 
  public:
   static constexpr const char* style_name = "dembark/granular";
@@ -52,8 +53,9 @@ class ContactCoefficients : protected LAMMPS_NS::Pointers {
   std::vector<std::array<int, 2>> coeff(int narg, char** arg);
   /// After the last pair_coeff: no pair has parameters yet.
   void begin();
-  /// The parameters of a pair of types that this style computes. What is missing or wrong ends the run with one line.
-  void complete(int i, int j);
+  /// The parameters of a pair of types that this style computes, the largest grain of which has `radius` (m; 0 without grains). What is
+  /// missing or wrong ends the run with one line.
+  void complete(int i, int j, double radius);
   bool is_complete(int i, int j) const { return complete_(i, j); }
 
   /// Of a pair that is not complete: what pair_style says of all.

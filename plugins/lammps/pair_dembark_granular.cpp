@@ -186,8 +186,9 @@ double PairDembarkGranular::largest_radius() const { return *std::max_element(la
 
 double PairDembarkGranular::init_one(int i, int j) {
   if (!setflag[i][j]) coefficients_.fail("pair_coeff " + std::to_string(i) + " " + std::to_string(j) + " is missing");
-  coefficients_.complete(i, j);
-  return largest_radius_[std::size_t(i)] + largest_radius_[std::size_t(j)] + reach();
+  const double one = largest_radius_[std::size_t(i)], other = largest_radius_[std::size_t(j)];
+  coefficients_.complete(i, j, std::max(one, other));
+  return one + other + reach();
 }
 
 double PairDembarkGranular::reach() const { return coefficients_.holds() ? neighbor->skin : 0.0; }

@@ -20,7 +20,7 @@ def deck(fix: str, run: str, *, create: str = CREATE, state: str = STATE) -> str
     text = bed(f"{FIXES[fix]}\n{run}", material=replace(WET, bridge_volume=0.0), create=create, state=state)
     if fix == "liquid":
         text = text.replace("pair_style dembark/granular", "pair_style dembark/granular capillary_model exact surface_tension 0.07 "
-                            "carried_liquid on").replace(" bridge_volume 0.0", "")
+                            "carried_liquid on").replace("pair_coeff 1 2", "pair_coeff * * contact_angle 0.35\npair_coeff 1 2")
     return text
 
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 
@@ -13,40 +14,42 @@
 namespace dembark {
 
 // The rows of the table. A new number is a row at the end of the second list; parsers, attributes and checks follow.
-//   NUMBER(scope, name, in camel case, unit, low, above `low`, high, infinite, default, doc, name in LIGGGHTS): see Parameter
+//   NUMBER(scope, name, in camel case, unit, low, above `low`, high, infinite, default, doc, name in LIGGGHTS, law): see Parameter
 // clang-format off
 /// Those that YADE has in places of their own: in its materials, in its law, and the volume of a bridge that forms.
 #define DEMBARK_SPECIAL_NUMBERS(NUMBER) \
-  NUMBER(type, youngs_modulus, youngsModulus, "Pa", 0, true, INFINITY, false, no_default, "Young's modulus", nullptr) \
-  NUMBER(type, poissons_ratio, poissonsRatio, "1", -1, true, 0.5, false, no_default, "Poisson's ratio", nullptr) \
+  NUMBER(type, youngs_modulus, youngsModulus, "Pa", 0, true, INFINITY, false, no_default, "Young's modulus", nullptr, any) \
+  NUMBER(type, poissons_ratio, poissonsRatio, "1", -1, true, 0.5, false, no_default, "Poisson's ratio", nullptr, any) \
   NUMBER(global, characteristic_velocity, characteristicVelocity, "m/s", 0, true, INFINITY, false, no_default, \
-         "impact speed at which the largest overlap of Hooke's law equals that of Hertz's", nullptr) \
-  NUMBER(pair, bridge_volume, bridgeVolume, "m^3", 0, false, INFINITY, false, no_default, "volume of each liquid bridge", nullptr)
+         "impact speed at which the largest overlap of Hooke's law equals that of Hertz's", nullptr, hooke) \
+  NUMBER(pair, bridge_volume, bridgeVolume, "m^3", 0, false, INFINITY, false, no_default, "volume of each liquid bridge", nullptr, bridge)
 #define DEMBARK_CONTACT_NUMBERS(NUMBER) \
   NUMBER(pair, restitution, restitution, "1", 0, true, 1, false, no_default, "coefficient of restitution without adhesion", \
-         "coefficientRestitution") \
-  NUMBER(pair, static_friction, staticFriction, "1", 0, false, INFINITY, false, no_default, "coefficient of static friction", nullptr) \
+         "coefficientRestitution", any) \
+  NUMBER(pair, static_friction, staticFriction, "1", 0, false, INFINITY, false, no_default, "coefficient of static friction", nullptr, any) \
   NUMBER(pair, kinetic_friction, kineticFriction, "1", 0, false, INFINITY, false, no_default, \
-         "coefficient of kinetic friction, at most the static one", nullptr) \
+         "coefficient of kinetic friction, at most the static one", nullptr, any) \
   NUMBER(pair, critical_slip_distance, criticalSlipDistance, "m", 0, false, INFINITY, true, no_default, \
-         "slip over which friction falls from its static to its kinetic value", nullptr) \
+         "slip over which friction falls from its static to its kinetic value", nullptr, any) \
   NUMBER(pair, interface_shear_strength, interfaceShearStrength, "Pa", 0, true, INFINITY, true, unlimited_strength, \
-         "shear strength of the interface; 1e30 or more is unlimited", nullptr) \
+         "shear strength of the interface; 1e30 or more is unlimited", nullptr, any) \
   NUMBER(global, healing_time, healingTime, "s", 0, false, INFINITY, true, 0, \
-         "time constant in which slip is forgotten while a contact sticks; 0 is at once", nullptr) \
+         "time constant in which slip is forgotten while a contact sticks; 0 is at once", nullptr, any) \
   NUMBER(pair, rolling_friction, rollingFriction, "1", 0, false, INFINITY, false, no_default, "coefficient of rolling resistance", \
-         "coefficientRollingFriction") \
+         "coefficientRollingFriction", rolling) \
   NUMBER(pair, rolling_damping_ratio, rollingDampingRatio, "1", 0, false, INFINITY, false, 0, "damping ratio of the rolling spring", \
-         "coefficientRollingViscousDamping") \
-  NUMBER(global, surface_tension, surfaceTension, "N/m", 0, false, INFINITY, false, no_default, "surface tension of the liquid", nullptr) \
-  NUMBER(pair, contact_angle, contactAngle, "rad", 0, false, 1.5707963267948966, false, no_default, "contact angle", nullptr) \
+         "coefficientRollingViscousDamping", rolling_spring) \
+  NUMBER(global, surface_tension, surfaceTension, "N/m", 0, false, INFINITY, false, no_default, "surface tension of the liquid", \
+         nullptr, bridge) \
+  NUMBER(pair, contact_angle, contactAngle, "rad", 0, false, 1.5707963267948966, false, no_default, "contact angle", nullptr, bridge) \
   NUMBER(global, liquid_viscosity, liquidViscosity, "Pa s", 0, false, INFINITY, false, 0, \
-         "viscosity of the liquid; 0 is without viscous forces", nullptr) \
+         "viscosity of the liquid; 0 is without viscous forces", nullptr, bridge) \
   NUMBER(global, minimum_gap, minimumGap, "m", 0, true, INFINITY, false, no_default, \
-         "gap below which viscous forces do not grow, the roughness of the surfaces", nullptr) \
-  NUMBER(pair, cohesive_force, cohesiveForce, "N", 0, false, INFINITY, false, no_default, "attraction of touching surfaces", nullptr) \
+         "gap below which viscous forces do not grow, the roughness of the surfaces", nullptr, bridge) \
+  NUMBER(pair, cohesive_force, cohesiveForce, "N", 0, false, INFINITY, false, no_default, "attraction of touching surfaces", \
+         nullptr, constant_force) \
   NUMBER(pair, work_of_adhesion, workOfAdhesion, "J/m^2", 0, false, INFINITY, false, no_default, \
-         "work of adhesion, twice the surface energy of equal materials", nullptr)
+         "work of adhesion, twice the surface energy of equal materials", nullptr, surface_energy)
 
 /// Choices by a word that all engines parse alike: CHOICE(name, in camel case, type, first, names of its values, doc).
 #define DEMBARK_CONTACT_CHOICES(CHOICE) \
@@ -64,8 +67,8 @@ enum class ContactNumber {
 };
 
 inline constexpr Parameter contact_parameters[] = {
-#define DEMBARK_ROW(scope, name, camel, unit, low, above, high, infinite, otherwise, doc, liggghts) \
-  {#name, #camel, unit, low, above, high, infinite, otherwise, Scope::scope, doc, liggghts},
+#define DEMBARK_ROW(scope, name, camel, unit, low, above, high, infinite, otherwise, doc, liggghts, law) \
+  {#name, #camel, unit, low, above, high, infinite, otherwise, Scope::scope, doc, liggghts, ReadBy::law},
     DEMBARK_SPECIAL_NUMBERS(DEMBARK_ROW) DEMBARK_CONTACT_NUMBERS(DEMBARK_ROW)
 #undef DEMBARK_ROW
 };
@@ -105,6 +108,43 @@ inline constexpr const char* contact_choices[] = {DEMBARK_CONTACT_CHOICES(DEMBAR
 #undef DEMBARK_NAME
 inline constexpr int contact_choice_count = sizeof(contact_choices) / sizeof(*contact_choices);
 
+/// The line about a number that the chosen laws do not read: which switch is off; empty where they read it. A number of 0 asks for nothing.
+inline std::string switched_off(const Parameter& p, double value, const ContactOptions& options, bool camel_case = false) {
+  if (p.law == ReadBy::any || std::isnan(value) || value == 0.0) return "";
+  const RollingModel rolling = options.rolling_resistance;
+  const CohesionLaw cohesion = options.cohesion;
+  const std::string rolls = rolling_names()[std::size_t(rolling)], coheres = cohesion_names()[std::size_t(cohesion)];
+  const auto unless = [&](bool on, const char* law, const char* in_camel_case, const std::string& chosen, const char* needed) {
+    return on ? ""
+              : std::string(camel_case ? p.camel_case : p.name) + " is given, but " + (camel_case ? in_camel_case : law) + " is " + chosen +
+                    "; it needs " + needed;
+  };
+  switch (p.law) {
+    case ReadBy::any: break;
+    case ReadBy::hooke: return unless(options.normal_law == NormalLaw::hooke, "normal_law", "normalLaw", "hertz", "hooke");
+    case ReadBy::rolling:
+      return unless(rolling != RollingModel::off, "rolling_resistance", "rollingResistance", rolls, "constant_torque or elastic_plastic");
+    case ReadBy::rolling_spring:
+      return unless(rolling == RollingModel::elastic_plastic, "rolling_resistance", "rollingResistance", rolls, "elastic_plastic");
+    case ReadBy::bridge:
+      return unless(cohesion == CohesionLaw::bridge, "cohesion", "cohesion", coheres,
+                    camel_case ? "bridge, which a capillaryModel is" : "bridge, which a capillary_model is");
+    case ReadBy::constant_force: return unless(cohesion == CohesionLaw::constant, "cohesion", "cohesion", coheres, "constant");
+    case ReadBy::surface_energy:
+      return unless(cohesion == CohesionLaw::dmt || cohesion == CohesionLaw::jkr, "cohesion", "cohesion", coheres, "dmt or jkr");
+  }
+  return "";
+}
+
+/// The line about a volume that can only be a mistake in its unit; empty for another one. `radius`: m, the largest of the bodies; 0 is
+/// unknown. `name`: as the user has written it.
+inline std::string wrong_bridge_volume(const std::string& name, double volume, double radius) {
+  const double cubes = volume / (radius * radius * radius);
+  if (!(radius > 0.0) || !(cubes > 100.0)) return "";
+  return name + " (m^3) is " + number_text(cubes) +
+         " cubes of the largest radius; a bridge between grains has at most a few, give its volume in m^3";
+}
+
 /// Where an engine keeps the numbers of a pair of types.
 class ContactSource {
  public:
@@ -128,6 +168,12 @@ class ContactSource {
     return value;
   }
 };
+
+/// Refuses what is given of a law that is switched off.
+inline void refuse_switched_off(const ContactOptions& options, const ContactSource& source, bool camel_case = false) {
+  for (const Parameter& p : contact_parameters)
+    if (const std::string line = switched_off(p, source.given(p, 1), options, camel_case); !line.empty()) source.wrong(line);
+}
 
 inline HertzParameters read_elasticity(const ContactSource& source) {
   typedef ContactNumber N;
@@ -197,6 +243,7 @@ inline ContactParameters chosen_laws(const ContactOptions& options) {
 }
 
 inline ContactParameters read_contact(const ContactOptions& options, const ContactSource& source) {
+  refuse_switched_off(options, source);
   ContactParameters p = chosen_laws(options);
   p.elasticity = read_elasticity(source);
   if (p.normal_law == NormalLaw::hooke) p.characteristic_velocity = source.number(ContactNumber::characteristic_velocity);

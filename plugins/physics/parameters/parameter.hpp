@@ -11,6 +11,9 @@ namespace dembark {
 /// Of what a number is: of the contact law, of a material, or of a pair of materials.
 enum class Scope { global, type, pair };
 
+/// Which law reads a number: each, or one that a user may leave off.
+enum class ReadBy { any, hooke, rolling, rolling_spring, bridge, constant_force, surface_energy };
+
 constexpr double no_default = NAN;  ///< of a number that must be given
 
 // In the order of a row, not of the sizes.
@@ -26,6 +29,7 @@ struct Parameter {         // NOLINT(clang-analyzer-optin.performance.Padding)
   Scope scope;
   const char* doc;       ///< one sentence without a full stop
   const char* liggghts;  ///< its name in LIGGGHTS where that is another one, else nullptr
+  ReadBy law;
 
   bool allows(double value) const {
     return (above_low ? value > low : value >= low) && value <= high && (infinite || std::isfinite(value));

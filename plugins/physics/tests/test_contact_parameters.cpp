@@ -21,15 +21,19 @@ struct Refused {
 class Numbers : public ContactSource {
  public:
   std::map<std::string, double> values;
-  mutable std::set<std::string> asked;
 
   Numbers() {
     for (const Parameter& p : contact_parameters) values[p.name] = std::isfinite(p.high) ? 0.5 * (p.low + p.high) : p.low + 1.0;
   }
 
+  /// Without those of laws that are off.
+  explicit Numbers(const ContactOptions& options) : Numbers() {
+    for (const Parameter& p : contact_parameters)
+      if (!switched_off(p, 1.0, options).empty()) values.erase(p.name);
+  }
+
   std::string name(const Parameter& p) const override { return p.name; }
   double given(const Parameter& p, int) const override {
-    asked.insert(p.name);
     const auto found = values.find(p.name);
     return found == values.end() ? NAN : found->second;
   }
@@ -89,17 +93,17 @@ std::string in_camel_case(const std::string& name) {
 
 }  // namespace
 
-TEST_CASE("all laws together ask for each number once known, and each is refused out of its range", "[parameters]") {
-  std::map<std::string, ContactOptions> asked;  // by whom
+TEST_CASE("all laws together read each number, and each is refused out of its range", "[parameters]") {
+  std::map<std::string, ContactOptions> reading;
   for (const ContactOptions& options : all_laws()) {
-    const Numbers numbers;
+    const Numbers numbers(options);
     CHECK(refusal(options, numbers).empty());
-    for (const std::string& name : numbers.asked) asked[name] = options;
+    for (const auto& [name, value] : numbers.values) reading[name] = options;
   }
   for (const Parameter& p : contact_parameters) {
-    REQUIRE(asked.count(p.name) == 1);
-    const ContactOptions& options = asked[p.name];
-    Numbers wrong;
+    REQUIRE(reading.count(p.name) == 1);
+    const ContactOptions& options = reading[p.name];
+    Numbers wrong(options);
     for (const double value : {p.low - 1.0, p.above_low ? p.low : double(NAN), p.infinite ? double(NAN) : double(INFINITY)}) {
       if (std::isnan(value)) continue;
       wrong.values[p.name] = value;
@@ -113,16 +117,61 @@ TEST_CASE("all laws together ask for each number once known, and each is refused
 }
 
 TEST_CASE("what does not go together is refused", "[parameters]") {
-  Numbers numbers;
+  Numbers numbers(ContactOptions{});
   numbers.values["kinetic_friction"] = 1.1;
   CHECK(refusal({}, numbers).find("must not exceed") != std::string::npos);
-  numbers.values["kinetic_friction"] = 0.5;
   ContactOptions jkr = everything();
   jkr.cohesion = CohesionLaw::jkr;
-  CHECK(refusal(jkr, numbers).find("hertz") != std::string::npos);
+  CHECK(refusal(jkr, Numbers(jkr)).find("hertz") != std::string::npos);
   ContactOptions carried = everything();
   carried.carried_liquid = true;
-  CHECK(refusal(carried, numbers).find("bridge_volume") != std::string::npos);
+  CHECK(refusal(carried, Numbers(carried)).find("bridge_volume") != std::string::npos);
+}
+
+TEST_CASE("a number is read, or refused with the switch of its law", "[parameters]") {
+  std::vector<ContactOptions> all = all_laws();
+  all.emplace_back();
+  all.push_back(everything());
+  all.back().normal_law = NormalLaw::hertz;
+  all.back().cohesion = CohesionLaw::jkr;
+  std::set<std::string> refused;
+  for (const ContactOptions& options : all) {
+    const Numbers numbers(options);
+    REQUIRE(refusal(options, numbers).empty());
+    for (const Parameter& p : contact_parameters) {
+      if (numbers.values.count(p.name)) {
+        // Without a viscosity nothing needs a gap.
+        if (&p == &parameter(ContactNumber::minimum_gap) && !options.viscous) continue;
+        Numbers fewer = numbers;
+        fewer.values.erase(p.name);
+        CHECK(refusal(options, fewer) == (p.required() ? std::string("missing ") + p.name : ""));
+        continue;
+      }
+      refused.insert(p.name);
+      Numbers more = numbers;
+      more.values[p.name] = 0.3;
+      const std::string line = refusal(options, more);
+      CHECK(line.find(std::string(p.name) + " is given, but ") == 0);
+      CHECK(line.find("; it needs ") != std::string::npos);
+      more.values[p.name] = 0.0;
+      CHECK(refusal(options, more).empty());
+    }
+  }
+  CHECK(refused == std::set<std::string>{"characteristic_velocity", "bridge_volume", "rolling_friction", "rolling_damping_ratio",
+                                         "surface_tension", "contact_angle", "liquid_viscosity", "minimum_gap", "cohesive_force",
+                                         "work_of_adhesion"});
+  CHECK(switched_off(parameter(ContactNumber::rolling_friction), 0.2, {}) ==
+        "rolling_friction is given, but rolling_resistance is off; it needs constant_torque or elastic_plastic");
+  CHECK(switched_off(parameter(ContactNumber::bridge_volume), 1e-11, {}, true) ==
+        "bridgeVolume is given, but cohesion is none; it needs bridge, which a capillaryModel is");
+}
+
+TEST_CASE("a bridge of more than a hundred cubes of the radius is a mistake in the unit", "[parameters]") {
+  const double radius = 2.5e-3, cube = radius * radius * radius;
+  CHECK(wrong_bridge_volume("bridge_volume", 99.0 * cube, radius).empty());
+  CHECK(wrong_bridge_volume("bridge_volume", 8e-2, radius) ==
+        "bridge_volume (m^3) is 5.12e+06 cubes of the largest radius; a bridge between grains has at most a few, give its volume in m^3");
+  CHECK(wrong_bridge_volume("bridge_volume", 8e-2, 0.0).empty());
 }
 
 TEST_CASE("a table has each name once, with a sentence", "[parameters]") {

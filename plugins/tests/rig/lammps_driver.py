@@ -49,8 +49,9 @@ def settings(m: Material) -> str:
 def coefficients(m: Material) -> str:
     """The words of `pair_coeff` after the types."""
     values = {name: getattr(m, name) for name in ("youngs_modulus", "restitution", "static_friction", "kinetic_friction",
-                                                  "critical_slip_distance", "rolling_friction", "rolling_damping_ratio", "bridge_volume",
-                                                  "contact_angle")}
+                                                  "critical_slip_distance", "rolling_friction", "rolling_damping_ratio")}
+    if m.bridge_volume > 0.0:
+        values |= {"bridge_volume": m.bridge_volume, "contact_angle": m.contact_angle}
     values |= {"poissons_ratio": m.poisson_ratio, "interface_shear_strength": min(m.interface_shear_strength, 1e300)}
     return " ".join(f"{name} {value!r}" for name, value in values.items())
 
