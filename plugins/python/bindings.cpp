@@ -149,6 +149,13 @@ NB_MODULE(_physics, m) {
     });
     return all;
   });
+  m.def("refuse_switched_off", [](const std::string& normal_law, const std::string& cohesion, const nb::dict& numbers_and_words) {
+    Given given(numbers_and_words);
+    given.options.normal_law = option_of<NormalLaw>("normal law", normal_law_names(), normal_law);
+    given.options.cohesion = option_of<CohesionLaw>("cohesion", cohesion_names(), cohesion);
+    refuse_switched_off(given.options, given);
+  });
+  m.def("wrong_bridge_volume", &wrong_bridge_volume);
   m.def("jkr_contact_radius", &jkr_contact_radius);
   m.def("jkr_force", &jkr_force);
   m.def("jkr_rupture_distance", &jkr_rupture_distance);

@@ -40,6 +40,17 @@ def _radii(radius_i: ArrayLike, radius_j: ArrayLike) -> tuple[NDArray[np.float64
     return a, b
 
 
+def _volumes(volume: ArrayLike, radius_i: NDArray[np.float64], radius_j: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`volume` (m^3) as float64; ValueError for less than 0 and, as in the engines, for more than 100 cubes of the largest radius."""
+    array = numbers("volume", volume, "m^3", low=0.0)
+    each, *pair = together(volume=array, radius_i=radius_i, radius_j=radius_j)
+    radius = np.maximum(*(np.where(np.isinf(one), 0.0, one) for one in pair))
+    worst = int(np.argmax(each / radius**3)) if each.size else None
+    if worst is not None and (line := _physics.wrong_bridge_volume("volume", float(each.flat[worst]), float(radius.flat[worst]))):
+        raise ValueError(line)
+    return array
+
+
 def _by_angle(contact_angle: NDArray[np.float64], model: str, call: Callable[..., NDArray[np.float64]],
               **arrays: NDArray[np.float64]) -> NDArray[np.float64] | float:
     angle, *columns = together(contact_angle=contact_angle, **arrays)
@@ -61,7 +72,7 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
 
     radius_i, radius_j : m, > 0; ``inf`` is a wall
     gap : m, surface to surface; zero or negative (overlap) is the force at touching
-    volume : m^3 of liquid in the bridge, >= 0
+    volume : m^3 of liquid in the bridge, >= 0; more than 100 cubes of the larger radius are refused as a wrong unit
     surface_tension : N/m, >= 0, <= 10
     contact_angle : rad, 0 to pi/2, mean of the two surfaces
     model : 'exact' (stable axisymmetric solution of Young and Laplace for the two radii; for V/R^3 = 1e-6...0.1 and angles up to 60
@@ -79,7 +90,7 @@ def capillary_force(radius_i: ArrayLike, radius_j: ArrayLike, gap: ArrayLike, vo
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
     a, b = _radii(radius_i, radius_j)
     return _by_angle(angle, model, _physics.BridgeForce.force, radius_i=a, radius_j=b, gap=numbers("gap", gap, "m", infinite=True),
-                     volume=numbers("volume", volume, "m^3", low=0.0), surface_tension=contact_number("surface_tension", surface_tension))
+                     volume=_volumes(volume, a, b), surface_tension=contact_number("surface_tension", surface_tension))
 
 
 def rupture_distance(volume: ArrayLike, contact_angle: ArrayLike, radius_i: ArrayLike, radius_j: ArrayLike, *,
@@ -92,5 +103,4 @@ def rupture_distance(volume: ArrayLike, contact_angle: ArrayLike, radius_i: Arra
     check_model(model)
     angle = numbers("contact_angle", contact_angle, "rad", low=0.0, high=np.pi / 2)
     a, b = _radii(radius_i, radius_j)
-    return _by_angle(angle, model, _physics.BridgeForce.rupture_distance, radius_i=a, radius_j=b,
-                     volume=numbers("volume", volume, "m^3", low=0.0))
+    return _by_angle(angle, model, _physics.BridgeForce.rupture_distance, radius_i=a, radius_j=b, volume=_volumes(volume, a, b))

@@ -23,6 +23,8 @@ Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 # As the monitor of integration in the engines.
 LEAST_STEPS = 10
+# Numbers without which a law of cohesion would do nothing.
+_NEEDS = {"bridge": ("bridge_volume",), "constant": ("cohesive_force",), "dmt": ("work_of_adhesion",), "jkr": ("work_of_adhesion",)}
 
 
 def _vector(name: str, value: Sequence[float], unit: str) -> NDArray[np.float64]:
@@ -71,10 +73,8 @@ class RollingResistance:
     def __post_init__(self) -> None:
         contact_number("rolling_friction", self.friction, "friction")
         contact_number("rolling_damping_ratio", self.damping_ratio, "damping_ratio")
-        if self.model == "constant_torque" and self.damping_ratio:
-            raise ValueError("damping_ratio is for the model 'elastic_plastic'")
-        if self.model == "off" and (self.friction or self.damping_ratio):
-            raise ValueError("the rolling resistance is off; its model can be 'constant_torque' or 'elastic_plastic'")
+        _physics.refuse_switched_off("hertz", "none", {"rolling_resistance": self.model, "rolling_friction": float(self.friction),
+                                                       "rolling_damping_ratio": float(self.damping_ratio)})
         object.__setattr__(self, "_law", _physics.RollingResistance(self.model, float(self.friction), float(self.damping_ratio)))
 
 
@@ -88,9 +88,11 @@ class Contact:
     normal_law : 'hertz' or 'hooke' (with characteristic_velocity, m/s)
     cohesion : 'none', 'bridge', 'constant' (cohesive_force, N), 'dmt' or 'jkr' (work_of_adhesion, J/m^2), see `dembark.physics.adhesion`;
         default: 'bridge' with a bridge_volume, else 'none'
-    bridge_volume : m^3 of each bridge, 0 = dry; with surface_tension (N/m), contact_angle (rad) and capillary_model
+    bridge_volume : m^3 of each bridge; 0, and none: dry; with surface_tension (N/m, required), contact_angle (rad) and capillary_model
     viscosity : Pa s of the liquid, 0 = no viscous force; with minimum_gap (m, > 0), see `viscous_resistance`
     rolling : rolling resistance
+
+    ValueError for values out of range, for numbers other than 0 that the laws do not read, and for missing ones.
     """
 
     effective_youngs_modulus: float
@@ -104,8 +106,8 @@ class Contact:
     cohesion: str = ""
     cohesive_force: float = 0.0
     work_of_adhesion: float = 0.0
-    bridge_volume: float = 0.0
-    surface_tension: float = 0.0
+    bridge_volume: float | None = None
+    surface_tension: float | None = None
     contact_angle: float = 0.0
     capillary_model: str = "exact"
     viscosity: float = 0.0
@@ -115,7 +117,7 @@ class Contact:
     def __post_init__(self) -> None:
         for name in ("restitution", "characteristic_velocity", "bridge_volume", "surface_tension", "contact_angle", "cohesive_force",
                      "work_of_adhesion"):
-            contact_number(name, getattr(self, name))
+            contact_number(name, self._number(name))
         for name in ("effective_youngs_modulus", "effective_shear_modulus"):
             contact_number("youngs_modulus", getattr(self, name), name)
         if self.normal_law not in ("hertz", "hooke"):
@@ -124,26 +126,34 @@ class Contact:
             raise ValueError(f"cohesion {self.cohesion!r} is unknown; it can be {', '.join(_physics.cohesion_laws())}")
         if self.cohesion == "jkr" and self.normal_law != "hertz":
             raise ValueError("the cohesion 'jkr' needs the normal law 'hertz'")
-        cohesion = self._cohesion
-        for name, laws in (("bridge_volume", ("bridge",)), ("cohesive_force", ("constant",)), ("work_of_adhesion", ("dmt", "jkr")),
-                           ("viscosity", ("bridge",))):
-            if getattr(self, name) and cohesion not in laws:
-                raise ValueError(f"{name} is for the cohesion {' or '.join(map(repr, laws))}, not for {cohesion!r}")
-            if cohesion in laws and name != "viscosity" and not getattr(self, name):
-                raise ValueError(f"the cohesion {cohesion!r} needs a {name} > 0")
         check_model(self.capillary_model)
         check_viscous(self.viscosity, self.minimum_gap)
+        # Of a bridge volume of 0, which is dry, the liquid may be given.
+        chosen = "bridge" if not self.cohesion and self.bridge_volume is not None else self._cohesion
+        _physics.refuse_switched_off(self.normal_law, chosen, {
+            "liquid_viscosity": float(self.viscosity), **{name: float(self._number(name)) for name in (
+                "bridge_volume", "surface_tension", "contact_angle", "minimum_gap", "cohesive_force", "work_of_adhesion")}})
+        for name in _NEEDS.get(self._cohesion, ()):
+            if not getattr(self, name):
+                raise ValueError(f"the cohesion {self._cohesion!r} needs a {name} > 0")
+        if self._cohesion == "bridge" and self.surface_tension is None:
+            raise ValueError("the cohesion 'bridge' needs a surface_tension (N/m)")
+
+    def _number(self, name: str) -> float:
+        """0 where it is not given."""
+        return getattr(self, name) if getattr(self, name) is not None else 0.0
 
     @property
     def _cohesion(self) -> str:
-        return self.cohesion or ("bridge" if self.bridge_volume > 0.0 else "none")
+        return self.cohesion or ("bridge" if self._number("bridge_volume") > 0.0 else "none")
 
     def begin(self) -> _physics.Contact:
         """State of a contact that has not touched yet."""
         return _physics.Contact(self.normal_law, self.effective_youngs_modulus, self.effective_shear_modulus, self.restitution,
                                 self.characteristic_velocity, self.tangential_damping, self.limit_force, self.friction._law,
                                 self.rolling._law, self._cohesion, self.cohesive_force, self.work_of_adhesion, self.capillary_model,
-                                self.contact_angle, self.surface_tension, self.bridge_volume, self.viscosity, self.minimum_gap)
+                                self.contact_angle, self._number("surface_tension"), self._number("bridge_volume"), self.viscosity,
+                                self.minimum_gap)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,7 +212,7 @@ def _integrate(contact: Contact, bodies: Sequence[Body], wall: tuple[Vector, Vec
     gap = (np.linalg.norm(separation()) if normal is None else np.dot(x[0] - point, normal)) - sum(body.radius for body in bodies)
     if gap < 0.0:
         raise ValueError(f"bodies must not touch at the start, but overlap by {-gap:g} m")
-    if contact.bridge_volume > volume:
+    if contact._number("bridge_volume") > volume:
         raise ValueError(f"bridge_volume must be at most that of the smallest sphere ({volume:.3g} m^3), not {contact.bridge_volume:g}")
     state = contact.begin()
     times = time_step * np.arange(1, steps + 1, dtype=np.float64)

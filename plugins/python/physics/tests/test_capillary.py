@@ -73,7 +73,7 @@ def test_no_liquid_no_force(model):
 @pytest.mark.parametrize("model", CAPILLARY_MODELS)
 @pytest.mark.parametrize("angle", [0.0, np.pi / 2])
 def test_ends_of_the_range_are_finite(model, angle):
-    gap, volume = np.meshgrid([-1e-5, 0.0, 1e-18, 1e-9, 1e-5, 1e-3, 1.0], [0.0, 5e-324, 1e-30, 1e-18, 1e-12, 1e-9, 1e-3])
+    gap, volume = np.meshgrid([-1e-5, 0.0, 1e-18, 1e-9, 1e-5, 1e-3, 1.0], [0.0, 5e-324, 1e-30, 1e-18, 1e-12, 1e-9, 1e-7])
     assert np.isfinite(capillary_force(R, 2 * R, gap, volume, GAMMA, angle, model=model)).all()
     assert np.isfinite(rupture_distance(volume, angle, R, np.inf, model=model)).all()
 
@@ -136,11 +136,22 @@ def test_bad_arguments(change, words):
     assert "\n" not in str(caught.value)
 
 
+@given(radius=st.floats(1e-5, 1.0), ratio=st.sampled_from([0.1, 1.0, np.inf]), cubes=st.floats(101.0, 1e9))
+def test_a_volume_in_another_unit_is_refused(radius, ratio, cubes):
+    """In the words of the engines; the larger radius that is not a wall counts."""
+    volumes = [0.0, cubes * radius**3, 1e-3 * radius**3]
+    for call in (lambda v: capillary_force(radius, ratio * radius, 0.0, v, GAMMA, 0.35, model="willett"),
+                 lambda v: rupture_distance(v, 0.35, ratio * radius, radius, model="willett")):
+        with pytest.raises(ValueError, match=r"volume \(m\^3\) is \S+ cubes of the largest radius; .* give its volume in m\^3"):
+            call(volumes)
+        call([0.0, 99.0 * radius**3])
+
+
 def test_arguments_that_are_no_numbers():
     with pytest.raises(TypeError, match="volume must be a number"):
         capillary_force(**GOOD | {"volume": "a drop"})
     with pytest.raises(ValueError, match="shape"):
-        capillary_force(**GOOD | {"gap": [0.0, 1.0], "volume": [1.0, 2.0, 3.0]})
+        capillary_force(**GOOD | {"gap": [0.0, 1.0], "volume": [1e-12, 2e-12, 3e-12]})
 
 
 @pytest.mark.parametrize("call", [

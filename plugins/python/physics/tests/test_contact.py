@@ -132,16 +132,24 @@ def test_bridge_holds_a_grain_and_needs_energy_to_part():
     ({"bridge_volume": 1e-12, "contact_angle": 2.0}, "contact.angle"), ({"bridge_volume": 1e-12, "capillary_model": "magic"}, "magic"),
     ({"normal_law": "hooke", "characteristic_velocity": 0.0}, "characteristic_velocity"),
     # What no law would use.
-    ({"work_of_adhesion": 0.1}, "work_of_adhesion is for the cohesion 'dmt' or 'jkr', not for 'none'"),
-    ({"cohesive_force": 1e-2, "cohesion": "jkr", "work_of_adhesion": 0.1}, "cohesive_force is for the cohesion 'constant', not for 'jkr'"),
-    ({"bridge_volume": 1e-12, "cohesion": "none"}, "bridge_volume is for the cohesion 'bridge'"),
-    ({"viscosity": 1e-3, "minimum_gap": 1e-6}, "viscosity is for the cohesion 'bridge'"),
+    ({"work_of_adhesion": 0.1}, "work_of_adhesion is given, but cohesion is none; it needs dmt or jkr"),
+    ({"cohesive_force": 1e-2, "cohesion": "jkr", "work_of_adhesion": 0.1}, "cohesive_force is given, but cohesion is jkr"),
+    ({"bridge_volume": 1e-12, "cohesion": "none"}, "bridge_volume is given, but cohesion is none; it needs bridge"),
+    ({"viscosity": 1e-3, "minimum_gap": 1e-6}, "liquid_viscosity is given, but cohesion is none; it needs bridge"),
+    ({"surface_tension": 0.072}, "surface_tension is given, but cohesion is none"),
+    ({"contact_angle": 0.3}, "contact_angle is given, but cohesion is none"),
+    ({"bridge_volume": 8e-11}, r"'bridge' needs a surface_tension \(N/m\)"),
     ({"cohesion": "jkr"}, "'jkr' needs a work_of_adhesion > 0"), ({"cohesion": "constant"}, "'constant' needs a cohesive_force > 0"),
     ({"cohesion": "bridge"}, "'bridge' needs a bridge_volume > 0"),
 ])
 def test_bad_contacts(change, words):
     with pytest.raises(ValueError, match=words):
         replace(CONTACT, **change).begin()
+
+
+def test_the_liquid_of_a_bridge_without_volume_is_no_mistake():
+    assert replace(CONTACT, bridge_volume=0.0, surface_tension=0.072, contact_angle=0.3).begin()
+    assert replace(CONTACT, bridge_volume=1e-12, surface_tension=0.0).begin()
 
 
 @pytest.mark.parametrize("arguments", [(-5e6, 0.3, 5e6, 0.3), (5e6, 0.6, 5e6, 0.3), (5e6, 0.3, 0.0, 0.3), (5e6, 0.3, 5e6, -1.0),
@@ -153,8 +161,10 @@ def test_bad_materials(arguments):
 
 
 def test_a_rolling_resistance_that_is_off_has_no_numbers():
-    with pytest.raises(ValueError, match="the rolling resistance is off"):
+    with pytest.raises(ValueError, match="rolling_friction is given, but rolling_resistance is off; it needs constant_torque or "):
         RollingResistance(friction=0.1)
+    with pytest.raises(ValueError, match="rolling_damping_ratio is given, but rolling_resistance is constant_torque; it needs"):
+        RollingResistance(model="constant_torque", friction=0.1, damping_ratio=0.3)
 
 
 @pytest.mark.parametrize("value", ["0.5", True])
