@@ -38,7 +38,6 @@ inline dembark::CohesionLaw adhesion_law(int choice) {
 template <bool Wet>
 class CohesionOnCore : public CohesionModelBase {
   static constexpr const char* model = Wet ? "cohesion capillary" : "cohesion adhesion";
-  static constexpr double largest_ratio = 100.0;  // of volume and cube of the radius; beyond it is a mistake in the unit
   int offset_;
   int model_ = 0, adhesion_ = 0;
   bool viscous_ = false, carried_ = false;
@@ -170,13 +169,12 @@ class CohesionOnCore : public CohesionModelBase {
       registry.connect("Yeff", youngs_modulus_, model);
     }
     laws_ = dembark_liggghts::read_cohesion(read, options);
-    const double largest = registry.max_radius() < 1e10 ? registry.max_radius() : 0.0, cube = largest * largest * largest;
+    const double largest = registry.max_radius() < 1e10 ? registry.max_radius() : 0.0;
     for (int i = 1; i <= read.types(); ++i)
-      for (int j = 1; j <= read.types(); ++j)
-        if (cube > 0.0 && laws_(i, j).liquid.bridge_volume > largest_ratio * cube)
-          read.fail("bridgeVolume (m^3) of types " + std::to_string(i) + "-" + std::to_string(j) + " is " +
-                    std::to_string(laws_(i, j).liquid.bridge_volume / cube) +
-                    " cubes of the largest radius; a bridge between grains has at most a few, give its volume in m^3");
+      for (int j = 1; j <= read.types(); ++j) {
+        const std::string line = dembark::wrong_bridge_volume("bridgeVolume", laws_(i, j).liquid.bridge_volume, largest);
+        if (!line.empty()) read.fail(line + " (types " + std::to_string(i) + "-" + std::to_string(j) + ")");
+      }
     if (carried_ && largest > 0.0) owner_->look_for_liquid(registry.min_radius(), largest);
     const auto reach = [this](int i, int j, double radius, double other) {
       return cohesion_reach(laws_(i, j), radius, other, youngs_modulus_ ? youngs_modulus_[i][j] : 0.0,
