@@ -98,14 +98,16 @@ class PhysSource : public ::dembark::ContactSource {
 	const Phys& phys;
 	const Pair& a;
 	const Pair& b;
+	const Real  speed;  // of Hooke's law
 
 public:
-	PhysSource(const Phys& contact, const Pair& one, const Pair& other) : phys(contact), a(one), b(other) {}
+	PhysSource(const Phys& contact, const Pair& one, const Pair& other, Real characteristicVelocity = NaN)
+		: phys(contact), a(one), b(other), speed(characteristicVelocity) {}
 	std::string name(const ::dembark::Parameter& p) const override { return p.camel_case; }
 	double      given(const ::dembark::Parameter& p, int) const override {
 		for (const Number& each : numbers)
 			if (&parameter(each.which) == &p) return phys.*each.kept >= 0.0 ? phys.*each.kept : NaN;
-		return NaN;
+		return &parameter(ContactNumber::characteristic_velocity) == &p ? speed : NaN;
 	}
 	[[noreturn]] void missing(const ::dembark::Parameter& p, int) const override {
 		fail(ip2 + name(p) + " is not set; give it a number" + (p.scope == ::dembark::Scope::pair ? " or a MatchMaker" : ""));
@@ -329,20 +331,28 @@ void Law2::prepare(Phys& phys, const Body& body1, const Body& body2) {
 		     " are both no spheres; the Finnie-Rabinowicz law knows a sphere with a sphere or with a wall");
 	phys.wallBody = sphere1 ? (sphere2 ? 0 : 2) : 1;
 
-	const PhysSource<Body>       source(phys, body1, body2);
+	const PhysSource<Body>       source(phys, body1, body2, characteristicVelocity);
 	const bool                   wet = options.cohesion == ::dembark::CohesionLaw::bridge;
 	::dembark::ContactParameters p   = ::dembark::chosen_laws(options);
 	p.elasticity                     = {phys.effectiveYoungsModulus, phys.effectiveShearModulus, phys.restitution};
 	p.characteristic_velocity        = characteristicVelocity;
-	p.friction                       = read_friction(options, source);
-	p.rolling                        = read_rolling(options, source);
+	refuse_switched_off(options, source, true);
+	p.friction = read_friction(options, source);
+	p.rolling  = read_rolling(options, source);
 	if (carriedLiquid && !wet) fail(law2 + "carriedLiquid needs a capillaryModel other than none");
 	// Materials without a bridge volume stay dry among wet ones, until a bridge of theirs is read from a file.
 	::dembark::ContactOptions own = options;
 	if (wet && !carriedLiquid && !(phys.newBridgeVolume > 0.0) && !(phys.bridgeVolume > 0.0))
 		own.cohesion = ::dembark::CohesionLaw::none;
-	own.viscous  = phys.liquidViscosity > 0.0;
-	p.cohesion   = read_cohesion(own, source);
+	own.viscous       = phys.liquidViscosity > 0.0;
+	p.cohesion        = read_cohesion(own, source);
+	const auto radius = [](const Body& body) {
+		const auto* const sphere = dynamic_cast<const Sphere*>(body.shape.get());
+		return sphere ? sphere->radius : 0.0;
+	};
+	const std::string line =
+		::dembark::wrong_bridge_volume("bridgeVolume", p.cohesion.liquid.bridge_volume, std::max(radius(body1), radius(body2)));
+	if (!line.empty()) source.wrong(line);
 	phys.contact = p;
 	// Packs do not write what the law would set to zero.
 	phys.kind = phys.wallBody || carriedLiquid || (phys.ruptureDistance > 0.0 && !p.cohesion.holds()) ? -1 : kinds.of(p);

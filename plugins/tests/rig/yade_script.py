@@ -78,6 +78,7 @@ def run(case, arrays):
         healingTime=m["healing_time"])
     if m["rolling_resistance"] != "off":
         laws.update(rollingFriction=m["rolling_friction"], rollingDampingRatio=m["rolling_damping_ratio"])
+    hooke = {"characteristicVelocity": m["characteristic_velocity"]} if m["normal_law"] == "hooke" else {}
     wet = m["bridge_volume"] > 0.0
     if wet:
         laws.update(bridgeVolume=m["bridge_volume"], contactAngle=m["contact_angle"], surfaceTension=m["surface_tension"],
@@ -104,8 +105,8 @@ def run(case, arrays):
             [Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom(), facets, Ig2_CylinderWall_Sphere_ScGeom()],
             [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(**laws)],
             [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
-                normalLaw=m["normal_law"], characteristicVelocity=m["characteristic_velocity"], presliding=m["presliding"],
-                frictionLimit=m["friction_limit"], rollingResistance=m["rolling_resistance"],
+                **hooke, normalLaw=m["normal_law"], presliding=m["presliding"], frictionLimit=m["friction_limit"],
+                rollingResistance=m["rolling_resistance"],
                 capillaryModel=m["capillary_model"] if wet else "none")]),
         NewtonIntegrator(damping=0, gravity=gravity),
     ]

@@ -54,6 +54,13 @@ def _motion(steps, ids):
     return {"rows": rows, "displacement": displacement}
 
 
+def read_by(law):
+    """Numbers of a liquid, or of rolling, that the law reads."""
+    if "capillaryModel" in law:
+        return WET
+    return {"elastic_plastic": ROLLING, "constant_torque": dict(rollingFriction=0.1)}.get(law.get("rollingResistance"), {})
+
+
 def impacts():
     """Oblique impacts, of two grains and of a grain on a wall that moves, listed first or last; with all positions and velocities."""
     found = {}
@@ -62,13 +69,13 @@ def impacts():
     for law in ({}, dict(normalLaw="hooke", characteristicVelocity=0.5), dict(limitForce=True), wet, *rolling):
         name = "+".join(["grains", *map(str, law.values())])
         grains = [grain((0, 0, 0), 0.003, (0.4, 0.9, 0), (0, 5, 30)), grain((0.00551, 0.0005, 0), R, (-0.3, 0, 0.02))]
-        account = scene_with(grains, WET if law is wet else ROLLING, law)
+        account = scene_with(grains, read_by(law), law)
         found[name] = _motion(600, (0, 1)) | {"energies": account.energies(), "law": law}
     for order, law in ((0, {}), (1, {}), (0, wet), (1, rolling[1])):
         wall = utils.wall(0, 2)
         wall.state.vel = Vector3(0.1, 0, 0.2)
         bodies = [wall, grain((0.001, 0.0005, 0.00251), R, (0.9, 0.1, -0.5), (20, -30, 10))]
-        account = scene_with(bodies[::-1] if order else bodies, WET if law is wet else ROLLING, law)
+        account = scene_with(bodies[::-1] if order else bodies, read_by(law), law)
         found["+".join([f"wall{order}", *law.values()])] = _motion(600, (1 - order, order)) | {"energies": account.energies(), "law": law}
     return found
 
@@ -147,7 +154,7 @@ def drum(**law):
     grains = [grain((x, y, z), r) for x, y, z, r in dilute_column((4, 3, 4), 0.0055, (-0.011, -0.008, -0.011), 40, 0.005, 0.1, 3, 0.0001)]
     held, guided = grain((0, 0.0, -0.0174), R, (0.05, 0, 0), fixed=True), grain((0.0005, 0, 0.0165), R, (0, 0, -0.2))
     guided.state.blockedDOFs = "zX"
-    account = scene_with([shape, held, guided, *grains], ROLLING, law, gravity=(0, 0, -9.81), step=1e-5)
+    account = scene_with([shape, held, guided, *grains], read_by(law), law, gravity=(0, 0, -9.81), step=1e-5)
     advance(6000)
     return account.energies()
 

@@ -276,6 +276,15 @@ def test_cylinder_along_x_in_a_periodic_cell_is_one_line(yade):
         ("drop(full | dict(bridgeVolume=1e-10, surfaceTension=0.07, contactAngle=2.0), dict(capillaryModel='exact'))",
          ("contactAngle", "1.5708"), 2)]),
     ("drop(full, dict(normalLaw='hooke'))", ("characteristicVelocity", "m/s"), 2),
+    # Of laws that are off, and in another unit.
+    *((f"drop(full | dict({given}), dict({law}))", words, 2) for given, law, words in [
+        ("bridgeVolume=1e-10, surfaceTension=0.07, contactAngle=0", "",
+         ("bridgeVolume is given, but cohesion is none; it needs bridge, which a capillaryModel is, bodies 0 and 1",)),
+        ("rollingFriction=0.2", "", ("rollingFriction is given, but rollingResistance is off; it needs constant_torque or",)),
+        ("workOfAdhesion=0.2", "cohesion='constant'", ("workOfAdhesion is given, but cohesion is constant; it needs dmt or jkr",)),
+        ("", "characteristicVelocity=2", ("characteristicVelocity is given, but normalLaw is hertz; it needs hooke",)),
+        ("bridgeVolume=8e-2, surfaceTension=0.07, contactAngle=0", "capillaryModel='exact'",
+         ("bridgeVolume (m^3) is 5.12e+06 cubes of the largest radius; ",))]),
     ("drop(full, speed=300.0)", ("sphere 1 went through wall 0", "time step"), 1)])
 def test_wrong_property_is_one_line_even_from_the_loop(yade, call, parts, code):
     assert_one_line(yade(script(yade, "property", DROP.format(call=call))), parts, code)

@@ -165,19 +165,23 @@ def contact_loop(p, materials, walls, static=None, kinetic=None):
     static = static or (p.grain_static, p.wall_static)
     kinetic = kinetic or (p.grain_kinetic, p.wall_kinetic)
     given = vars(p)
-    names = {"interfaceShearStrength": "interface_shear_strength", "liquidViscosity": "liquid_viscosity", "minimumGap": "minimum_gap"}
+    # What a law that is off would not read is refused.
+    liquid = {"liquidViscosity": "liquid_viscosity", "minimumGap": "minimum_gap", "contactAngle": "contact_angle",
+              "surfaceTension": "surface_tension"}
+    names = {"interfaceShearStrength": "interface_shear_strength"} | (liquid if p.wet else {})
     more = {word: given[key] for word, key in names.items() if key in given}
     law = {"presliding": p.presliding} if "presliding" in given else {}
     if given.get("rolling_resistance", "off") != "off":
-        more |= {"rollingFriction": pairs(materials, p.grain_rolling, p.wall_rolling), "rollingDampingRatio": p.rolling_damping_ratio}
+        more["rollingFriction"] = pairs(materials, p.grain_rolling, p.wall_rolling)
+        if p.rolling_resistance == "elastic_plastic":
+            more["rollingDampingRatio"] = p.rolling_damping_ratio
         law["rollingResistance"] = p.rolling_resistance
     return SphereContactLoop(
         [Ig2_Sphere_Sphere_ScGeom(), *walls],
         [Ip2_FrictMat_FrictMat_FinnieRabinowiczPhys(
             restitution=pairs(materials, p.restitution, given.get("wall_restitution", p.restitution)),
             staticFriction=pairs(materials, *static), kineticFriction=pairs(materials, *kinetic),
-            criticalSlipDistance=p.critical_slip_distance, bridgeVolume=0 if p.carried else p.bridge_volume, contactAngle=p.contact_angle,
-            surfaceTension=p.surface_tension, **more)],
+            criticalSlipDistance=p.critical_slip_distance, bridgeVolume=0 if p.carried else p.bridge_volume, **more)],
         [Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz(
             capillaryModel=p.capillary_model if p.wet else "none", carriedLiquid=bool(p.carried), **law)])
 
