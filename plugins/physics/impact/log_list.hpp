@@ -24,7 +24,9 @@ inline std::map<std::int64_t, Attitude> read_logs(const std::string& path) {
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
     const auto wrong = [&](const std::string& what) {
-      throw std::runtime_error("file " + path + ", line " + std::to_string(number) + ": " + what);
+      std::string text = "file ";
+      text.append(path).append(", line ").append(std::to_string(number)).append(": ").append(what);
+      throw std::runtime_error(text);
     };
     std::istringstream words(line.substr(0, line.find('#')));
     if ((words >> std::ws).eof()) continue;
