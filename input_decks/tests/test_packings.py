@@ -18,6 +18,7 @@ LEAST = 5
 RANDOM = ("column_collapse", "debarking_drum", "gravity_channel", "log_pile", "plane_silo", "plug_flow", "silo")
 # Cases that may have fewer, with the reason.
 FEWER = {
+    "triaxial": "a lattice has no packing; the disordered grains have five",
     "rotating_drum": "a drum that turns steadily forgets its packing: intervals come from blocks of its time; `full` has three packings",
     "hopper_discharge": "the rate is a mean over thousands of grains of one long run; `full` has three packings",
     "conical_silo": "the rate is a mean over tens of thousands of grains of one long run; the narrow silo has three packings",

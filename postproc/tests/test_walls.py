@@ -100,7 +100,7 @@ def test_other_files_are_no_stl(tmp_path, content):
     (tmp_path / "part.stl").write_bytes(content)
     with pytest.raises(DumpError, match="STL"):
         read_stl(tmp_path / "part.stl")
-    with pytest.raises(DumpError, match="cannot be read"):
+    with pytest.raises(DumpError, match="does not exist"):
         read_stl(tmp_path / "nowhere.stl")
 
 
