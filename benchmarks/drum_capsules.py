@@ -71,23 +71,23 @@ def places(count: int, radius: float, layers: int) -> Array:
 
 def layout(count: int, *, in_space: bool) -> tuple[Array, float, float, float]:
     """Places (m) of the logs at the start, radius (m), speed (rad/s) and length (m) of their drum; a cross-section has no length."""
-    whole = drum_length(count) if in_space else 0.0
-    layers = int(whole / (1.01 * TOTAL)) if in_space else 1
+    long = drum_length(count) if in_space else 0.0
+    layers = int(long / (1.01 * TOTAL)) if in_space else 1
     radius = RADIUS if in_space else math.sqrt(float(np.sum(logs(count)[0] ** 2)) / FILLING)
     spot = places(count, radius, layers)
-    spot[:, 2] = ((spot[:, 2] + 0.5) / layers - 0.5) * whole
-    return spot, radius, SPEED * math.sqrt(RADIUS / radius), whole
+    spot[:, 2] = ((spot[:, 2] + 0.5) / layers - 0.5) * long
+    return spot, radius, SPEED * math.sqrt(RADIUS / radius), long
 
 
 def space(count: int, slope: float | None) -> CapsuleSystem:
     """The level, closed drum (slope None), or the one that repeats along its axis, with a slope in degrees."""
     r, length, mass = logs(count)
-    spot, radius, speed, whole = layout(count, in_space=True)
+    spot, radius, speed, long = layout(count, in_space=True)
     shell = Drum(radius=radius, omega=speed, stiffness=SHELL)
     tilt = math.radians(slope or 0.0)
     return CapsuleSystem(mass, r, length, spot, stiffness=STIFFNESS, friction=FRICTION, theta=THETA, contact_damping=DAMPING,
-                         gravity=(0.0, -GRAVITY * math.cos(tilt), GRAVITY * math.sin(tilt)), period=0.0 if slope is None else whole,
-                         walls=[shell, *shell.end_plates(whole)] if slope is None else [shell])
+                         gravity=(0.0, -GRAVITY * math.cos(tilt), GRAVITY * math.sin(tilt)), period=0.0 if slope is None else long,
+                         walls=[shell, *shell.end_plates(long)] if slope is None else [shell])
 
 
 def section(count: int) -> tuple[ImpactSystem, float]:
@@ -111,8 +111,8 @@ def run(system: CapsuleSystem | ImpactSystem, speed: float, revolutions: float) 
 def deck(count: int, steps: int, *, in_space: bool) -> tuple[str, str]:
     """LIGGGHTS's script of the level, closed drum, or of the cross-section, and its list of logs; the last frame is dumped."""
     r, length, mass = logs(count)
-    spot, radius, speed, whole = layout(count, in_space=in_space)
-    wide, high = 1.1 * radius, 0.6 * whole + 0.5
+    spot, radius, speed, long = layout(count, in_space=in_space)
+    wide, high = 1.1 * radius, 0.6 * long + 0.5
     lines = ["units si", "atom_style granular", "atom_modify map array sort 0 0.0", "boundary f f f", "newton off",
              "communicate single vel yes",
              f"region domain block {-wide} {wide} {-wide} {wide} {-high} {high} units box",
@@ -124,7 +124,7 @@ def deck(count: int, steps: int, *, in_space: bool) -> tuple[str, str]:
             f"{'logs logs.txt' if in_space else ''} wall cylinder shell z 0 0 {radius!r} stiffness {SHELL} omega {speed!r}")
     if in_space:
         for name, side in (("back", "lo"), ("front", "hi")):
-            hits += f" wall plane {name} z {(0.5 if side == 'hi' else -0.5) * whole!r} {side} stiffness {SHELL} omega {speed!r} 0 0"
+            hits += f" wall plane {name} z {(0.5 if side == 'hi' else -0.5) * long!r} {side} stiffness {SHELL} omega {speed!r} 0 0"
     lines += [f"fix weight all gravity {GRAVITY} vector 0 -1 0", hits, "fix motion all nve/sphere",
               f"dump logs all custom {max(1, steps)} logs.dump id x y z radius mass",
               'dump_modify logs sort id format "%d %.15g %.15g %.15g %.15g %.15g"',

@@ -103,10 +103,10 @@ def measured(folder: Path, booked: float = 1.0, lost: int = 0, *, lighter: float
     run, hits = trough(folder, part=False), record(folder, lost=lost)
     rows = account(dict(run.rows), booked)
     share = rows["time"] / rows["time"][-1]
-    whole = 60 * MASS * 2.0 * SPEED
-    rows |= {"part_work": 0.0 * share, "part_jx": -0.2 * whole * share, "part_jy": 0.0 * share, "part_jz": whole * share}
+    both = 60 * MASS * 2.0 * SPEED
+    rows |= {"part_work": 0.0 * share, "part_jx": -0.2 * both * share, "part_jy": 0.0 * share, "part_jz": both * share}
     # As heavy as the impacts on the part are strong.
-    light = replace(run, rows=rows, weight=whole / (PERIODS * PERIOD))
+    light = replace(run, rows=rows, weight=both / (PERIODS * PERIOD))
     p = defaults("vibro_hardening")
     # Grains so soft that each alone would have the recorded peak force.
     softer = hits.peaks()[0] / hits.shadows(hardening.own_modulus(p), p["restitution"])[0][0]
@@ -231,8 +231,8 @@ def test_octaves_of_a_record_are_those_of_its_impacts_and_of_its_length(tmp_path
     """Impacts at even times that are half sines of the recorded peak and duration; and a window that is too short for low bands."""
     hits = record(tmp_path)
     pulses = hits.peaks() / np.sin(0.5 * np.pi * (LASTS - 1) / LASTS), np.full(60, LASTS * STRIDE * STEP)
-    whole = hardening.Noise(hits, pulses, pulses)
-    assert whole.ratio == pytest.approx(1.0, abs=0.1) and abs(whole.unexplained) < 1e-12
+    both = hardening.Noise(hits, pulses, pulses)
+    assert both.ratio == pytest.approx(1.0, abs=0.1) and abs(both.unexplained) < 1e-12
     short = replace(hits, periods=1, period=0.02)
     with np.errstate(invalid="ignore"):
         few = hardening.Noise(short, pulses, pulses)
@@ -320,10 +320,10 @@ def octave_control(folder: Path) -> Control:
     right = measured(folder)
     with pytest.MonkeyPatch.context() as patch:
         part_noise = sys.modules[hardening.Noise.__module__]
-        whole = part_noise.mean_squares
+        both = part_noise.mean_squares
 
         def without_the_last(*given: Any) -> Any:
-            bands, squares = whole(*given)
+            bands, squares = both(*given)
             return type(bands)(bands.numbers[:-1]), squares[:-1]
 
         patch.setattr(part_noise, "mean_squares", without_the_last)
