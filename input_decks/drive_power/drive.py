@@ -73,6 +73,10 @@ class Drive:
         """Gain of a column in the measuring window."""
         return float(self.rows[name][self.ends[-1]] - self.rows[name][self.ends[self.steady]])
 
+    def window(self, name: str) -> Array:
+        """The rows (periods, rows of each) of a column in the measuring window."""
+        return np.asarray(self.rows[name][self.ends[self.steady] + 1 : self.ends[-1] + 1].reshape(len(self.ends) - 1 - self.steady, -1))
+
     def powers(self, name: str = "walls") -> Array:
         """Mean power (periods,) in each period over M g V, from the account's work of the walls or from that of the force on the plate."""
         return np.diff(self.rows[name][self.ends]) / (self.period * self.weight * self.speed)
@@ -108,8 +112,7 @@ class Drive:
     def spectrum(self) -> tuple[float, float, float]:
         """Of the height of the centre of mass in the measuring window (m): amplitudes of its first two harmonics of the drive, and the root
         mean square of all else."""
-        rows = self.rows["weight_height"][self.ends[self.steady] + 1 : self.ends[-1] + 1].reshape(len(self.ends) - 1 - self.steady, -1)
-        return spectrum(rows / self.weight)
+        return spectrum(self.window("weight_height") / self.weight)
 
     def kinetic(self) -> Estimate:
         """Mean kinetic energy in the measuring window (J)."""
@@ -177,8 +180,7 @@ def transients(runs: list[Drive]) -> list[Curve]:
 
 def phases(runs: list[Drive], block: Block | None) -> Curve:
     """Curve of the force on the plate over the phase; its note says how long a sticking block of this acceleration flies."""
-    forces = [one.rows["plate_fz"][one.ends[one.steady] + 1 : one.ends[-1] + 1].reshape(len(one.ends) - 1 - one.steady, -1).mean(axis=0)
-              / one.weight for one in runs]
+    forces = [one.window("plate_fz").mean(axis=0) / one.weight for one in runs]
     phase: Any = (np.arange(len(forces[0])) + 1.0) / len(forces[0])
     note = "" if block is None else f"a block that sticks where it lands would be in flight for {block.flight:.3f} of the period"
     return profile("force", "Force on the plate over the phase", "phase of the drive (periods)", "F / (M g)", phase, forces, note=note)

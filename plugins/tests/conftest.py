@@ -1,6 +1,7 @@
 """Makes the rig importable, and runs every scenario once in every program."""
 
 import sys
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
@@ -8,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from rig import lammps_driver, liggghts_driver, python_driver, walls, yade_driver
+from rig import impact_decks, lammps_driver, liggghts_driver, python_driver, walls, yade_driver
 from rig.motion import Motion
 from rig.scenarios import SCENARIOS
 
@@ -63,3 +64,16 @@ def yade_is_there() -> None:
 @pytest.fixture(scope="session")
 def lammps_is_there() -> None:
     skip_without(lammps_driver)
+
+
+@pytest.fixture(params=impact_decks.DRIVERS)
+def engine(request: pytest.FixtureRequest) -> str:
+    """Each engine with `fix lcp/impact`."""
+    request.getfixturevalue(f"{request.param}_is_there")
+    return request.param
+
+
+@pytest.fixture
+def run(engine: str) -> partial[impact_decks.Result]:
+    """`run(folder, case, ...)` in this engine."""
+    return partial(impact_decks.run, engine=engine)

@@ -3,7 +3,7 @@
 import math
 import subprocess
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,17 +15,6 @@ from dembark.physics import Drum, FinnieRabinowicz, ImpactSystem, Plane
 
 # Few steps: ranks that wait for each other take long on a busy machine.
 FALLING = replace(pile(steps=1750, every=125, local="local.dump"), time_step=4e-5)
-
-
-@pytest.fixture(params=impact_decks.DRIVERS)
-def engine(request):
-    request.getfixturevalue(f"{request.param}_is_there")
-    return request.param
-
-
-@pytest.fixture
-def run(engine):
-    return partial(impact_decks.run, engine=engine)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -20,17 +19,6 @@ from dembark.physics import CapsuleSystem, Drum, ImpactSystem, Plane
 
 SHELL = "wall cylinder shell z 0 0 0.65 stiffness 5e7 omega 2.0"
 PLATES = "wall plane back z -0.9 lo stiffness 5e7 omega 2.0 0 0 wall plane front z 0.9 hi stiffness 5e7 omega 2.0 0 0"
-
-
-@pytest.fixture(params=impact_decks.DRIVERS)
-def engine(request):
-    request.getfixturevalue(f"{request.param}_is_there")
-    return request.param
-
-
-@pytest.fixture
-def run(engine):
-    return partial(impact_decks.run, engine=engine)
 
 
 def moments(logs: Sequence[Log]) -> NDArray[np.float64]:
