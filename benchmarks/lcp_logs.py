@@ -1,6 +1,7 @@
 """Contact problems of logs in a drum and in a pile, as the impact model makes them, and as files in Matrix Market form.
 
-`python -m benchmarks.lcp_logs FOLDER` writes <name>_M.mtx and <name>_q.mtx of each problem: w = M z + q, w >= 0, z >= 0, z w = 0.
+`python -m benchmarks.lcp_logs FOLDER` writes <name>_M.mtx and <name>_q.mtx of each problem, w = M z + q, w >= 0, z >= 0, z w = 0, and its
+solution <name>_z.mtx. `scipy.io.mmread` and all that reads Matrix Market files reads them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from scipy.spatial import cKDTree
 from benchmarks.frame import ended, say
 from benchmarks.lcp_cases import Problem
 from dembark.common.errors import DembarkError
-from dembark.physics import Drum, ImpactSystem, Plane
+from dembark.physics import Drum, ImpactSystem, Plane, solve_lcp
 
 STIFFNESS, WALL_STIFFNESS, G = 1e7, 5e7, 9.81  # N/m, N/m, m/s^2
 Floats = NDArray[np.float64]
@@ -127,13 +128,13 @@ def problems(count: int = 60) -> dict[str, Problem]:
 
 
 def write(folder: Path, count: int) -> list[Path]:
-    """Two files of each problem."""
+    """Three files of each problem."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, one in problems(count).items():
         about = f"{name}: {count} logs, omega tau at the end of the name; LCP w = M z + q of contact forces z (N) and gaps w (m)"
         stem = folder / name.replace(" ", "_")
-        for part, numbers in (("M", one.M), ("q", one.q[:, None])):
+        for part, numbers in (("M", one.M), ("q", one.q[:, None]), ("z", solve_lcp(one.M, one.q).z[:, None])):
             path = stem.with_name(f"{stem.name}_{part}.mtx")
             mmwrite(path, numbers, comment=about, precision=17, symmetry="symmetric" if part == "M" else "general")
             written.append(path)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import mmread
+from scipy.optimize import nnls
 
 from benchmarks import lcp_claims, lcp_logs
 from benchmarks.lcp_cases import Problem, certificate, network
@@ -60,13 +61,21 @@ def test_the_problems_are_those_of_the_impact_model(make):
     np.testing.assert_allclose(np.sort(found[found > 0.0]), np.sort(forces[forces > 0.0]), rtol=1e-9)
 
 
-def test_files_hold_the_problems(tmp_path):
+def test_files_hold_the_problems_and_their_solutions(tmp_path):
     assert lcp_logs.main([str(tmp_path), "--logs", "12"]) == 0
-    assert len(list(tmp_path.glob("*.mtx"))) == 12
-    M, q = mmread(tmp_path / "drum_4_M.mtx"), mmread(tmp_path / "drum_4_q.mtx").ravel()  # noqa: N806
-    expected = lcp_logs.problems(12)["drum 4"]
-    np.testing.assert_allclose(M.toarray(), expected.dense, rtol=0.0, atol=1e-15 * expected.dense.max())  # one triangle is written
-    np.testing.assert_allclose(q, expected.q, rtol=1e-15)
+    assert len(list(tmp_path.glob("*.mtx"))) == 18
+    for name, expected in lcp_logs.problems(12).items():
+        stem = name.replace(" ", "_")
+        M, q, z = (mmread(tmp_path / f"{stem}_{part}.mtx") for part in "Mqz")  # noqa: N806
+        np.testing.assert_allclose(M.toarray(), expected.dense, rtol=0.0, atol=1e-15 * expected.dense.max())  # one triangle is written
+        np.testing.assert_allclose(q.ravel(), expected.q, rtol=1e-15)
+        solved = solve_lcp(M.tocsc(), q.ravel())
+        np.testing.assert_allclose(solved.z, z.ravel(), rtol=0.0, atol=1e-11 * z.max())
+        assert (z > 0.0).sum() >= 3
+        # Another method, which only knows the file: M is G^T G, and z is the solution of non-negative least squares.
+        factor = np.linalg.cholesky(M.toarray()).T
+        other = nnls(factor, -np.linalg.solve(factor.T, q.ravel()))[0]
+        np.testing.assert_allclose(other, z.ravel(), rtol=0.0, atol=1e-8 * z.max())
     assert lcp_logs.main([str(tmp_path), "--logs", "5"]) == 2
 
 
