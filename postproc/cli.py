@@ -27,6 +27,7 @@ from .cli_options import (
     picture_size,
     positive,
     removal_force,
+    value_or_name,
     value_range,
 )
 from .cli_output import check_places, progress, provenance, say
@@ -223,8 +224,8 @@ def debark(
         "Width of the circumference that an effective impact clears of bark: '5 mm'."))] = None,
     energy: Annotated[float | None, typer.Option(parser=positive("J/m^2", "--energy"), metavar="TEXT", help=(
         "Or: energy of friction per area that takes bark off: '2 kJ/m^2'."))] = None,
-    speed: Annotated[float | None, typer.Option(parser=positive("rad/s", "--speed"), metavar="TEXT", help=(
-        "Speed of the drum: '11.5 rpm'. Required."))] = None,
+    speed: Annotated[str | None, typer.Option(metavar="TEXT", help=(
+        "Speed of the drum: '11.5 rpm', or the parameter of the runs that has it: drum_speed. Required."))] = None,
     begin: Annotated[float, typer.Option(min=0.0, help="Begin of the window in s, after the run-in.")] = 0.0,
     end: Annotated[float | None, typer.Option(min=0.0, help="Its end in s; default: that of the run, or the last impact.")] = None,
     least_speed: Annotated[float, typer.Option(min=0.0, help="Approach (m/s) from which a contact is an impact.")] = 0.0,
@@ -232,14 +233,19 @@ def debark(
         "Local stiffness of a log, for the wood-loss index."))] = None,
     length_: Annotated[float | None, typer.Option("--length", parser=positive("m", "--length"), metavar="TEXT", help=(
         "Length of the logs."))] = None,
+    radius: Annotated[float | None, typer.Option(parser=positive("m", "--radius"), metavar="TEXT", help=(
+        "Radius of the drum; with --stiffness it gives the force that no impact exceeds by its energy."))] = None,
+    against: Annotated[str | None, typer.Option(metavar="PARAMETER", help=(
+        "Compare the IMPACTS or RUNs by this parameter of theirs, such as filling or drum_speed."))] = None,
     sectors: Annotated[int, typer.Option(min=1, max=3600, help="Sectors of the circumference.")] = 12,
     out: Annotated[Path | None, typer.Option(help="NetCDF file of doses and degree, for xarray.")] = None,
     plot: Plot = None,
 ) -> None:
     """Degree of debarking and wood damage from the impacts of logs in a drum."""
-    from .debarking import ForceRange, RemovalLaw, outcome
+    from .debarking import ForceRange, Outcome, RemovalLaw, outcome
+    from .debarking.report import against as compared
     from .debarking.report import dataset, figures, lines
-    from .debarking.sources import Given, files_of, load_of
+    from .debarking.sources import Given, files_of, load_of, parameter
 
     if wood_force is None:
         raise DembarkError("the force that damages wood is not given", "", "give it with --wood-force; there is no default")
@@ -247,15 +253,32 @@ def debark(
     law = RemovalLaw(clears, energy) if clears or energy else None
     if speed is None:
         raise DembarkError("the speed of the drum is not given", "", "give it with --speed, such as '11.5 rpm'")
+    if radius and not stiffness:
+        raise DembarkError("--stiffness is missing", "with --radius", "the bound of the forces depends on the stiffness of the logs")
+    if against and (out or not law):
+        raise DembarkError("with --against there is no --out" if out else "--against compares degrees of debarking", "",
+                           "write one file for each drum" if out else "give --clears or --energy")
     files = [file for source in sources for file in files_of(source)]
     check_places(out, plot=plot, read=(*files, grains))
-    given = Given(speed, grains, begin, end, least_speed, stiffness or math.nan, length_ or math.nan)
+    given = Given(value_or_name(speed, "rad/s", "--speed"), grains, begin, end, least_speed, stiffness or math.nan, length_ or math.nan,
+                  radius or math.nan)
     results = []
     with progress("debark", len(files)) as advance:
         for file in files:
             results.append(outcome(load_of(file, given), forces, law, sectors))
             advance()
     written = []
+    if against:
+        groups: dict[float, list[Outcome]] = {}
+        for file, one in zip(files, results, strict=True):
+            groups.setdefault(parameter(file, against), []).append(one)
+        if plot:
+            from .plots import save
+
+            written += save(plot, {"against": compared(groups, against)})
+        say([line for value in sorted(groups) for line in (f"{against} = {value:g}", *lines(groups[value]))]
+            + [f"written: {path}" for path in written])
+        return
     if out:
         from .output.netcdf import write_netcdf
 

@@ -48,6 +48,11 @@ def positive(unit: str, option: str) -> Callable[[str], float]:
     return read
 
 
+def value_or_name(text: str, unit: str, option: str) -> float | str:
+    """A positive number in `unit` (SI), or the name of a parameter, which begins with a letter."""
+    return text if text.isidentifier() else positive(unit, option)(text)
+
+
 def removal_force(force: float | None, bond: str | None, area: float | None, friction: float | None) -> float:
     """The peak force (N) that removes bark: given, or that of a `bond`, `species:condition` or a strength, on an `area` (m2)."""
     from .debarking.laws import bark_force

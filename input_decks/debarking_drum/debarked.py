@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dembark.postproc.debarking import ForceRange, Load, Logs, Outcome, RemovalLaw, outcome, peak_of_speed
+from dembark.postproc import debarking
+from dembark.postproc.debarking import ForceRange, Load, Logs, Outcome, RemovalLaw, outcome
 from dembark.postproc.impacts import RECORD
 from dembark.postproc.measurement import Curve, Numbers, Replica, profile
 from dembark.postproc.replica import cached_per_replica
@@ -16,10 +17,9 @@ SECTORS = 12  # of the circumference
 
 
 def force_bound(given: Numbers, radius: float) -> float:
-    """N; that no impact of one or two logs exceeds, of the heaviest ones, each with the energy of the shell's speed and of a fall through
-    the drum of the `radius` (m): v sqrt(s m) with v^2 = (speed R)^2 + 4 g R."""
+    """N; that no impact of one or two logs exceeds in the drum of the `radius` (m)."""
     mass = 0.25 * math.pi * given["log_density"] * given["log_length"] * given["log_diameter_max"] ** 2
-    return peak_of_speed(math.sqrt((given["drum_speed"] * radius) ** 2 + 4.0 * given["gravity"] * radius), given["log_stiffness"], mass)
+    return debarking.force_bound(given["drum_speed"], radius, given["log_stiffness"], mass, given["gravity"])
 
 
 @cached_per_replica

@@ -80,15 +80,17 @@ def plane_of(impacts: Impacts) -> tuple[int, int]:
     for axis in (2, 1, 0):
         if flat[axis]:
             return (axis + 1) % 3, (axis + 2) % 3
-    raise DumpError("the normals of the impacts do not lie in a plane of two axes; debarking is that of logs in cross-section")
+    raise DumpError("the normals of the impacts do not lie in a plane of two axes; sectors and cleared widths are those of logs in "
+                    "cross-section: take one sector, and a law by energy")
 
 
 def doses(impacts: Impacts, logs: Logs, forces: ForceRange, edges: Array, *, sectors: int = 12, least_speed: float = 0.0,
           stiffness: float = math.nan) -> Doses:
     """Doses of `impacts` that began in the spans between `edges` (s, ascending); slower ones than `least_speed` (m/s) count for friction
-    only. `stiffness` (N/m): of the logs' surface. The angle in a log's own frame is that of the contact less the log's rotation."""
+    only. `stiffness` (N/m): of the logs' surface. The angle in a log's own frame is that of the contact less the log's rotation; with one
+    sector it does not count, so logs may turn in space."""
     spans, count = len(edges) - 1, len(logs.ids)
-    across, up = plane_of(impacts)
+    across, up = plane_of(impacts) if sectors > 1 else (0, 1)
     tables = {name: np.zeros(spans * count * sectors) for name in ("useful", "damaging", "friction", "excess")}
     peaks, shape = [np.zeros(0)], [np.zeros(0)]
     for start in range(0, len(impacts), _CHUNK):

@@ -62,6 +62,14 @@ def peak_of_speed(speed: float, stiffness: float, mass: float) -> float:
     return speed * math.sqrt(stiffness * mass)
 
 
+def force_bound(speed: float, radius: float, stiffness: float, mass: float, gravity: float = 9.81) -> float:
+    """N; that no impact of one or two logs exceeds in a drum of the `radius` R (m): v sqrt(s m) with v^2 = (speed R)^2 + 4 g R, rad/s.
+
+    Two of the heaviest logs (`mass`, kg; `stiffness`, N/m) meet head on, each with the speed of the shell and of a fall through the drum.
+    """
+    return peak_of_speed(math.sqrt((speed * radius) ** 2 + 4.0 * gravity * radius), stiffness, mass)
+
+
 def peak_of_impulse(impulse: Array, stiffness: float, mass: float, restitution: float) -> Array:
     """Peak force (N) of an `impulse` (N s) that is known without its duration: J = m v (1 + e), so F = J sqrt(k / m) / (1 + e)."""
     return np.asarray(impulse * (math.sqrt(stiffness / mass) / (1.0 + restitution)))

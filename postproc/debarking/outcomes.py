@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 from ..impacts import Impacts
 from ..resampling import resampled
 from ..statistics import Estimate, time_blocks
-from .dose import Doses, Logs, doses
-from .laws import ForceRange, RemovalLaw
+from .dose import Doses, Logs, doses, plane_of
+from .laws import ForceRange, RemovalLaw, force_bound
 
 Array = NDArray[np.float64]
 
@@ -28,6 +28,7 @@ class Load:
 
     least_speed : m/s, approach from which a contact is an impact
     stiffness : N/m, of a log's surface; NaN: unknown, and no wood loss
+    radius : m, of the drum; NaN: unknown, and no bound of the forces
     """
 
     impacts: Impacts
@@ -37,6 +38,12 @@ class Load:
     period: float
     least_speed: float = 0.0
     stiffness: float = math.nan
+    radius: float = math.nan
+
+    @property
+    def bound(self) -> float:
+        """Force (N) that no impact exceeds by its energy; NaN without the radius of the drum or the stiffness."""
+        return force_bound(2.0 * math.pi / self.period, self.radius, self.stiffness, float(self.logs.masses.max()))
 
     @property
     def edges(self) -> Array:
@@ -81,6 +88,8 @@ class Outcome:
 def outcome(load: Load, forces: ForceRange, law: RemovalLaw | None = None, sectors: int = 12) -> Outcome:
     """The outcome of a load: doses of impacts in the range of `forces`, and with a `law` the degree of debarking."""
     logs = load.logs
+    if law is not None and law.width is not None:
+        plane_of(load.impacts)  # what an impact clears along the length of a log is not known in space
     found = doses(load.impacts, logs, forces, load.edges, sectors=sectors, least_speed=load.least_speed, stiffness=load.stiffness)
     left = None
     if law is not None:
@@ -117,8 +126,9 @@ def _values(result: Outcome) -> dict[str, Estimate]:
         return float((per_sector.var(axis=1, ddof=1)[hit] / mean[hit]).mean()) if hit.any() else math.nan
 
     values = {"useful_impacts": rate(useful, count), "damaging_impacts": rate(damaging, count), "damaging_share": over(damaging_share),
-              "friction_work": rate(friction, logs.surface), "wood_loss_index": rate(excess, float(logs.masses.sum())),
-              "sector_dispersion": over(dispersion)}
+              "friction_work": rate(friction, logs.surface), "wood_loss_index": rate(excess, float(logs.masses.sum()))}
+    if found.useful.shape[2] > 1:
+        values["sector_dispersion"] = over(dispersion)
     if result.law is not None:
         alone = "one load: only several loads give an interval"
         values["debarking_degree"] = Estimate(float(result.degree[-1]), math.inf, alone)

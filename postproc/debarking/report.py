@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from itertools import cycle
 
 import matplotlib
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -56,7 +58,9 @@ def lines(results: Sequence[Outcome]) -> list[str]:
         p99 = over_replicas([Estimate(float(np.percentile(one, 99.0)), math.inf) for one in peaks if len(one)])
         half = f" ± {p99.half:.2g}" if math.isfinite(p99.half) else ""
         shape = np.median(np.concatenate([one.doses.shape for one in results]))
-        found += [f"peak force of impacts: 99 % are at most {p99.value:.4g}{half} N, the largest is {every.max():.4g} N",
+        bound = max(one.load.bound for one in results)
+        of_bound = "" if math.isnan(bound) else f", none can exceed {bound:.4g} N by its energy"
+        found += [f"peak force of impacts: 99 % are at most {p99.value:.4g}{half} N, the largest is {every.max():.4g} N{of_bound}",
                   f"peak force over that of a half sine of the same impulse and duration: median {shape:.3f}"]
     if len(results) < 3:
         found.append("intervals are from quarter revolutions; three or more loads give those over loads")
@@ -91,6 +95,40 @@ def dataset(results: Sequence[Outcome], **attributes: str | float) -> xarray.Dat
                       **attributes)
 
 
+def against(groups: Mapping[float, Sequence[Outcome]], label: str) -> Figure:
+    """Degree of debarking of drums that differ in one number, named `label`: against residence time, and against that number after three
+    residence times. Logs that are hit evenly around at the mean rates of the window; bands and bars are 95 % intervals over loads."""
+    order = sorted(groups)
+    times = [pooled_values(groups[value])["debarking_time"].value for value in order]
+    # Where a log is never hit, 90 % may never be reached: then as long as was measured.
+    longest = max([one for one in times if math.isfinite(one)] or [groups[value][0].revolutions[-1] * groups[value][0].load.period
+                                                                   for value in order])
+
+    def degree(results: Sequence[Outcome], seconds: float) -> Estimate:
+        return over_replicas([Estimate(100.0 * float(one.even(np.array([seconds / one.load.period]))[0]), math.inf) for one in results])
+
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 2.8), layout="constrained")
+        over_time, across = figure.subplots(1, 2, sharey=True)
+        seconds = np.linspace(0.0, 1.2 * longest, 61)
+        for colour, value in zip(cycle(PALETTE), order, strict=False):
+            found = [degree(groups[value], float(one)) for one in seconds]
+            middle, half = np.array([one.value for one in found]), np.array([one.half for one in found])
+            over_time.plot(seconds / 60.0, middle, color=colour, label=f"{value:g}")
+            if np.isfinite(half).all():
+                over_time.fill_between(seconds / 60.0, middle - half, middle + half, color=colour, alpha=0.2, lw=0.0)
+        over_time.set(xlabel="residence time (min)", ylabel="degree of debarking (%)", ylim=(0, 102), xlim=(0, seconds[-1] / 60.0))
+        over_time.legend(title=label, loc="lower right")
+        for number, share in enumerate((0.25, 0.5, 1.0)):
+            found = [degree(groups[value], share * longest) for value in order]
+            bars = [one.half if math.isfinite(one.half) else 0.0 for one in found]
+            across.errorbar(order, [one.value for one in found], bars, fmt="o-", ms=3, capsize=2, color=PALETTE[number],
+                            label=f"{share * longest / 60.0:.2g} min")
+        across.set(xlabel=label)
+        across.legend(title="residence time", loc="lower right")
+    return figure
+
+
 def figures(results: Sequence[Outcome]) -> dict[str, Figure]:
     """Degree of debarking against revolutions and residence time; doses around the logs and by diameter; peak forces."""
     with matplotlib.rc_context(STYLE):
@@ -120,22 +158,28 @@ def _degree(results: Sequence[Outcome]) -> Figure:
 
 
 def _doses(results: Sequence[Outcome]) -> Figure:
-    figure = Figure(figsize=(7.2, 2.5), layout="constrained")
-    around, across = figure.subplots(1, 2)
     sectors = results[0].doses.useful.shape[2]
+    figure = Figure(figsize=(7.2 if sectors > 1 else 3.6, 2.5), layout="constrained")
+    panels = figure.subplots(1, 2 if sectors > 1 else 1, squeeze=False)[0]
+    across, tables = panels[-1], [one.doses.effective.sum(axis=0) / one.revolutions[-1] for one in results]
+    if sectors > 1:
+        _around(panels[0], tables)
+    for one, table in zip(results, tables, strict=True):
+        across.plot(2e3 * one.load.logs.radii, table.sum(axis=1), ".", color=PALETTE[0], ms=3)
+    across.set(xlabel="diameter of the log (mm)", ylabel="effective impacts per revolution")
+    across.set_ylim(bottom=0.0)
+    return figure
+
+
+def _around(around: Axes, tables: Sequence[Array]) -> None:
+    sectors = tables[0].shape[1]
     angle = (np.arange(sectors) + 0.5) * 360.0 / sectors
-    tables = [one.doses.effective.sum(axis=0) / one.revolutions[-1] for one in results]
     spread = np.concatenate([table / np.maximum(table.mean(axis=1, keepdims=True), 1e-300) for table in tables])
     for share, colour in ((10, PALETTE[2]), (50, PALETTE[0]), (90, PALETTE[1])):
         around.plot(angle, np.percentile(spread, share, axis=0), color=colour, label=f"{share} % of the logs are below")
     around.set(xlabel="angle in the log's own frame (°)", ylabel="effective impacts over the log's mean", xlim=(0, 360))
     around.set_ylim(bottom=0.0)
     around.legend()
-    for one, table in zip(results, tables, strict=True):
-        across.plot(2e3 * one.load.logs.radii, table.sum(axis=1), ".", color=PALETTE[0], ms=3)
-    across.set(xlabel="diameter of the log (mm)", ylabel="effective impacts per revolution")
-    across.set_ylim(bottom=0.0)
-    return figure
 
 
 def _forces(results: Sequence[Outcome]) -> Figure:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 
@@ -23,17 +24,19 @@ _NAMES = ("impacts.txt", "impacts.bin")
 
 @dataclass(frozen=True)
 class Given:
-    """What the user says of a source, in SI units: angular velocity of the drum (rad/s), begin and end of the window (s; None: the end of
-    the run, or the last impact), approach from which a contact is an impact (m/s), stiffness of a log (N/m) and length of the logs (m; NaN:
-    unknown); `grains`, a dump of the logs, None: that next to the impacts."""
+    """What the user says of a source, in SI units: angular velocity of the drum (rad/s; text: the parameter of the run that has it), begin
+    and end of the window (s; None: the end of the run, or the last impact), approach from which a contact is an impact (m/s), stiffness of
+    a log (N/m), length of the logs and radius of the drum (m; NaN: unknown); `grains`, a dump of the logs, None: that next to the impacts.
+    """
 
-    speed: float
+    speed: float | str
     grains: Path | None = None
     begin: float = 0.0
     end: float | None = None
     least_speed: float = 0.0
     stiffness: float = math.nan
     length: float = math.nan
+    radius: float = math.nan
 
 
 def files_of(path: Path) -> list[Path]:
@@ -49,13 +52,25 @@ def files_of(path: Path) -> list[Path]:
 def load_of(file: Path, given: Given) -> Load:
     """The load whose impacts are in `file`; DembarkError or DumpError in one line where something is missing."""
     record = read_json(file.parent / "run.json") or {}
-    impacts, period = read_impacts(file), 2.0 * math.pi / given.speed
+    speed = parameter(file, given.speed) if isinstance(given.speed, str) else given.speed
+    impacts, period = read_impacts(file), 2.0 * math.pi / speed
     if not len(impacts):
         raise DembarkError(f"{file} holds no impact")
     begin, end = given.begin, given.end if given.end is not None else _last(impacts, record)
     if end - begin < 0.25 * period:
         raise DembarkError(f"the window of {file} from {begin:g} to {end:g} s is less than a quarter of a revolution ({period:.3g} s)")
-    return Load(_counted(impacts, record), _logs(file, given), begin, end, period, given.least_speed, given.stiffness)
+    return Load(_counted(impacts, record), _logs(file, given), begin, end, period, given.least_speed, given.stiffness,
+                given.radius)
+
+
+def parameter(file: Path, name: str) -> float:
+    """The number that the run of a file of impacts has for a parameter; DembarkError where it has none."""
+    known = (read_json(file.parent / "run.json") or {}).get("parameters", {})
+    value = known.get(name)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        numbers = [one for one, number in known.items() if isinstance(number, int | float) and not isinstance(number, bool)]
+        raise DembarkError(f"the run of {file} has no number of the name {name!r}", nearest(name, numbers))
+    return float(value)
 
 
 def _last(impacts: Impacts, record: Mapping[str, Any]) -> float:

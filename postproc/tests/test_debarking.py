@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -25,12 +27,14 @@ from dembark.postproc.debarking import (
     bond,
     dose,
     doses,
+    force_bound,
     outcome,
     peak_of_duration,
     peak_of_impulse,
     peak_of_speed,
 )
-from dembark.postproc.impacts import COLUMNS, RECORD
+from dembark.postproc.debarking.report import against, figures, lines
+from dembark.postproc.impacts import COLUMNS, RECORD, read_impacts
 from dembark.validation.cli import main
 
 RANGE = ForceRange(1000.0, 5000.0)
@@ -146,6 +150,42 @@ def test_harder_impacts_damage_more_wood() -> None:
     assert "debarking_degree" not in hard
 
 
+def test_two_logs_that_fall_head_on_reach_the_bound_and_no_more() -> None:
+    """Masses on springs in series, each with the speed of the shell and of a fall, by integration of their motion."""
+    speed, radius, s, m = 1.2, 1.3, 1e7, 30.0
+    v = math.sqrt((speed * radius) ** 2 + 4.0 * 9.81 * radius)
+    done = solve_ivp(lambda _, y: [y[1], -0.5 * s * y[0] / (0.5 * m)], (0.0, math.pi / math.sqrt(s / m)), [0.0, 2.0 * v], rtol=1e-10,
+                     atol=1e-12, max_step=1e-5)
+    bound = force_bound(speed, radius, s, m)
+    assert (0.5 * s * done.y[0]).max() == pytest.approx(bound, rel=1e-6)
+    one = Load(records(1), Logs(np.array([1, 2]), np.array([0.1, 0.1]), np.array([m, 0.5 * m])), 0.0, 1.0, 2.0 * math.pi / speed,
+               stiffness=s, radius=radius)
+    assert one.bound == pytest.approx(bound)
+    assert math.isnan(load(records(1)).bound)
+
+
+def in_space(count: int) -> np.ndarray:
+    """Impacts with normals in all directions."""
+    normal = np.random.default_rng(5).normal(size=(3, count))
+    nx, ny, nz = normal / np.linalg.norm(normal, axis=0)
+    return records(count, nx=nx, ny=ny, nz=nz, friction_loss=0.5)
+
+
+def test_logs_in_space_have_one_sector_and_lose_bark_by_energy() -> None:
+    """Rotations mean nothing there; the doses are those of the same impacts in a plane."""
+    law = RemovalLaw(energy=200.0)
+    found, flat = outcome(load(in_space(900), ONE), RANGE, law, sectors=1), outcome(load(even_impacts(900), ONE), RANGE, law, sectors=1)
+    assert found.degree[-1] == pytest.approx(1.0 - math.exp(-450.0 / (200.0 * 2.0 * math.pi * 0.1 * 1.5)), rel=1e-9)
+    for name in ("useful_impacts", "friction_work"):
+        assert found.values[name].value == pytest.approx(flat.values[name].value)
+    assert "sector_dispersion" not in found.values
+    assert any(line.startswith("impacts in the range") for line in lines([found]))
+    assert sorted(figures([found])) == ["degree", "doses", "forces"]
+    for sectors, other in ((12, law), (1, RemovalLaw(width=0.002))):
+        with pytest.raises(DumpError, match="take one sector, and a law by energy"):
+            outcome(load(in_space(9), ONE), RANGE, other, sectors=sectors)
+
+
 def test_forces_of_impulses_are_those_of_the_motion() -> None:
     k, m, v = 4e6, 20.0, 1.5
     for zeta in (0.0, 0.2, 0.5):
@@ -205,11 +245,14 @@ def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_command_reads_the_loads_of_a_run(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["debark", "out", "--speed", "30 rpm", "--begin", "2", "--bark-force", "1 kN", "--wood-force", "5 kN", "--clears", "2 mm",
-                 "--stiffness", "1 MN/m", "--length", "1.5 m", "--least-speed", "0.1", "--out", "d.nc", "--plot", "p"]) == 0
+                 "--stiffness", "1 MN/m", "--length", "1.5 m", "--radius", "1 m", "--least-speed", "0.1", "--out", "d.nc",
+                 "--plot", "p"]) == 0
     said = capsys.readouterr().out
     assert "3 loads of 2 logs, 4 revolutions of 2 s each, from 2 s on" in said
     # 440 impacts in four revolutions, on one of the two logs; Student's interval over 420, 440, 460.
     assert f"impacts in the range, per log and revolution: 55 ± {4.303 * 2.5 / math.sqrt(3):.2g}\n" in said
+    # Two logs of 30 kg that meet head on, each with the speed of a shell of 1 m and of a fall of 2 m.
+    assert f"the largest is 2000 N, none can exceed {math.sqrt(1e6 * 30.0 * (math.pi**2 + 4.0 * 9.81)):.4g} N by its energy" in said
     assert "degree of debarking at the end" in said and "time to 90%" not in said.split("±")[0]
     with xarray.open_dataset("d.nc") as found:
         assert found.useful_impacts.sum(("log", "sector")).values.tolist() == [420, 440, 460]
@@ -226,6 +269,67 @@ def test_command_reads_a_file_of_the_users_own(runs: Path, capsys: pytest.Captur
     assert "range of forces: 1800 to 5000 N" in said and "wood-loss" not in said
     assert main(words) == 2
     assert "the speed of the drum is not given" in capsys.readouterr().err
+
+
+@pytest.fixture
+def drums(runs: Path) -> Path:
+    """Two drums of three loads: the second turns three times as fast, and its logs get as many impacts a revolution."""
+    for folder, slower in (("slow", 3.0), ("fast", 1.0)):
+        for one in sorted((runs / "out").iterdir()):
+            other = runs / folder / one.name
+            shutil.copytree(one, other)
+            record = {"time_step": 0.01 * slower, "steps": 1000,
+                      "parameters": {"drum_speed": math.pi / slower, "filling": 0.3, "model": "x"}}
+            (other / "run.json").write_text(json.dumps(record))
+            file = next(other.glob("impacts.*"))
+            impacts = np.array(read_impacts(file))
+            impacts["time"] *= slower
+            file.unlink()
+            (other / "impacts.bin").write_bytes(impacts.tobytes())
+    return runs
+
+
+COMPARED = ["debark", "slow", "fast", "--speed", "drum_speed", "--begin", "6", "--bark-force", "1 kN", "--wood-force", "5 kN"]
+
+
+def test_command_compares_drums(drums: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*COMPARED, "--clears", "2 mm", "--against", "drum_speed", "--plot", "p"]) == 0
+    slow, fast = capsys.readouterr().out.split("drum_speed = 3.14159\n")
+    assert slow.startswith("drum_speed = 1.0472\n3 loads of 2 logs, 4 revolutions of 6 s each, from 6 s on")
+    assert fast.startswith("3 loads of 2 logs, 2 revolutions of 2 s each, from 6 s on")
+    hits = [float(found[1]) for one in (slow, fast) if (found := re.search(r"in the range, per log and revolution: (\S+)", one))]
+    assert hits == pytest.approx([55.0, 55.0], rel=0.15)
+    assert [path.name for path in (drums / "p").iterdir()] == ["against.png"]
+
+
+def test_figure_compares_degrees_of_debarking() -> None:
+    """The curve of each drum is the mean of its loads, and the points are on the curves."""
+    groups = {value: [outcome(load(even_impacts(count + 20 * seed, seed), ONE), RANGE, RemovalLaw(width=0.002)) for seed in range(3)]
+              for value, count in ((0.3, 600), (0.2, 300))}
+    over_time, across = against(groups, "filling").axes
+    curves = {str(line.get_label()): np.asarray(line.get_xydata()) for line in over_time.lines}
+    assert sorted(curves) == ["0.2", "0.3"]
+    longest = max(np.mean([one.values["debarking_time"].value for one in some]) for some in groups.values())
+    for place, value in enumerate(sorted(groups)):
+        minutes, degree = curves[f"{value:g}"].T
+        expected = np.mean([one.even(60.0 * minutes / PERIOD) for one in groups[value]], axis=0)
+        np.testing.assert_allclose(degree, 100.0 * expected, rtol=1e-9)
+        points = [float(bar.lines[0].get_ydata()[place]) for bar in across.containers]
+        np.testing.assert_allclose(points, np.interp(np.array([0.25, 0.5, 1.0]) * longest / 60.0, minutes, degree), atol=0.1)
+    idle = {0.1: [outcome(load(records(9, peak_force=1.0), ONE), RANGE, RemovalLaw(width=0.002))]}
+    assert all((np.asarray(line.get_ydata()) == 0.0).all() for line in against(idle, "filling").axes[0].lines)
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    (["--clears", "2 mm", "--against", "fillin"], "has no number of the name 'fillin', did you mean filling?"),
+    (["--clears", "2 mm", "--against", "model"], "has no number of the name 'model'"),
+    (["--against", "filling"], "give --clears or --energy"),
+    (["--clears", "2 mm", "--against", "filling", "--out", "d.nc"], "with --against there is no --out"),
+    (["--radius", "1.3 m"], "--stiffness is missing")])
+def test_mistakes_of_a_comparison_are_one_line(drums: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str) -> None:
+    assert main([*COMPARED, *words]) == 2
+    said = capsys.readouterr().err
+    assert message in " ".join(said.split()) and said.count("\n") == 1
 
 
 @pytest.mark.parametrize(("words", "message"), [
