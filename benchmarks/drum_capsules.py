@@ -35,6 +35,8 @@ from numpy.typing import NDArray
 from benchmarks.drum_penalty import DAMPING, DENSITY, FILLING, GRAVITY, SHELL, SPEED, STIFFNESS, spent_by
 from dembark.physics import CapsuleSystem, Drum, ImpactMotion, ImpactSystem, Plane
 from dembark.postproc import GrainsDump
+from dembark.postproc.debarking import ForceRange, Load, Logs, outcome
+from dembark.postproc.impacts import RECORD
 from dembark.postproc.statistics import student
 
 Array = NDArray[np.float64]
@@ -42,6 +44,7 @@ TOTAL, THIN, THICK = 1.2, 0.10, 0.24  # m
 RADIUS, FRICTION, STEP, THETA = 1.3, 0.4, 2e-4, 0.5
 SLOPES = (2.0, 4.0)  # degrees
 SLOWEST = 0.1  # m/s: what begins slower is no impact
+RANGE = ForceRange(1800.0, 1e4)  # N, as in the studies of debarking_drum
 SAMPLES = 80  # a revolution
 
 
@@ -195,12 +198,23 @@ def interval(values: Array) -> list[float]:
     return [float(parts.mean()), float(student(len(parts) - 1) * parts.std(ddof=1) / math.sqrt(len(parts)))]
 
 
-def measure(motion: ImpactMotion, cost: float, speed: float) -> dict[str, Any]:
-    """What all three have in common: cost, contacts, impacts a log and revolution, their mean peak force (N), certificate."""
+def debarked(motion: ImpactMotion, radius: Array, mass: Array, speed: float) -> dict[str, list[float]]:
+    """Value and half of its 95 % interval of what debarking depends on, a log and revolution: impacts in the range of forces of the studies
+    of the case debarking_drum, and above it (J/kg: the wood-loss index), and the work of friction (J/m2). The logs have one sector."""
+    found = np.array([(i.a, i.b, i.time, i.duration, i.peak_force, i.impulse, i.relative_speed, i.dissipated, *i.point, i.friction_loss,
+                       *i.normal, i.turn_a, i.turn_b) for i in motion.impacts])
+    load = Load(found.view(RECORD)[:, 0], Logs(np.arange(len(mass)), radius, mass, TOTAL), float(motion.time[0]), float(motion.time[-1]),
+                2 * math.pi / speed, SLOWEST, STIFFNESS)
+    return {name: [one.value, one.half] for name, one in outcome(load, RANGE, sectors=1).values.items()}
+
+
+def measure(motion: ImpactMotion, cost: float, speed: float, radius: Array, mass: Array) -> dict[str, Any]:
+    """What all three have in common: cost, contacts, impacts a log and revolution, their mean peak force (N), certificate, debarking."""
     hard = [i for i in motion.impacts if i.relative_speed >= SLOWEST]
     turns = (motion.time[-1] - motion.time[0]) * speed / (2 * math.pi)
     return {"ms_per_step": 1e3 * cost, "active": interval(motion.report["active"]), "impacts": len(hard) / turns / motion.position.shape[1],
-            "peak_force": float(np.mean([i.peak_force for i in hard])), "certificate": float(motion.report["worst_certificate"][-1])}
+            "peak_force": float(np.mean([i.peak_force for i in hard])), "certificate": float(motion.report["worst_certificate"][-1]),
+            "debarking": debarked(motion, radius, mass, speed)}
 
 
 def along(motion: ImpactMotion) -> dict[str, Any]:
@@ -220,6 +234,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     found: dict[str, Any] = {"logs": options.logs, "revolutions": options.revolutions, "drum_length": drum_length(options.logs)}
+    r, _, mass = logs(options.logs)
     if options.only in (None, "crib"):
         found["crib"] = crib()
         print("crib", found["crib"], flush=True)
@@ -228,14 +243,14 @@ def main() -> None:
         print("engine", found["engine"], flush=True)
     if options.only in (None, "section"):
         discs, speed = section(options.logs)
-        found["section"] = measure(*run(discs, speed, options.revolutions), speed)
+        found["section"] = measure(*run(discs, speed, options.revolutions), speed, r, mass)
         print("section", found["section"], flush=True)
     for slope in (None, *SLOPES):
         if options.only not in (None, "closed" if slope is None else "inclined"):
             continue
         motion, cost = run(space(options.logs, slope), SPEED, options.revolutions)
         name = "closed" if slope is None else f"inclined {slope:g}"
-        found[name] = measure(motion, cost, SPEED) | along(motion)
+        found[name] = measure(motion, cost, SPEED, r, mass) | along(motion)
         print(name, found[name], flush=True)
     if options.out:
         options.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

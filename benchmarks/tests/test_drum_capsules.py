@@ -36,6 +36,20 @@ def test_as_many_discs_as_logs_start_without_overlap() -> None:
     assert speed**2 * radius == pytest.approx(drum.SPEED**2 * drum.RADIUS)
 
 
+def test_debarking_counts_the_impacts_of_a_motion() -> None:
+    """Of logs that have fallen on the shell and on each other: the sums over all impacts, worked out one by one."""
+    r, _, mass = drum.logs(150)
+    motion = drum.space(150, None).run(1.4, drum.STEP, every=100)
+    found = drum.debarked(motion, r, mass, drum.SPEED)
+    quarters = int((motion.time[-1] - motion.time[0]) * drum.SPEED / (2 * math.pi) * 4 + 1e-6)
+    inside = [i for i in motion.impacts if i.time < quarters * math.pi / (2 * drum.SPEED)]
+    hits = sum(1 + (i.b >= 0) for i in inside if i.relative_speed >= drum.SLOWEST and drum.RANGE.bark <= i.peak_force <= drum.RANGE.wood)
+    assert quarters == 1 and hits > 20
+    assert found["useful_impacts"][0] == pytest.approx(4 * hits / 150)
+    area = 2 * math.pi * r.sum() * drum.TOTAL
+    assert found["friction_work"][0] == pytest.approx(4 * sum(i.friction_loss for i in inside) / area)
+
+
 def test_too_many_logs_are_refused() -> None:
     with pytest.raises(ValueError, match="1000 logs do not fit into the drum"):
         drum.places(1000, 1.0, 2)
