@@ -48,6 +48,19 @@ def test_pandas_and_numpy_read_them_in_one_line(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.memmap(path.with_suffix(".bin"), RECORD, "r")["peak_force"], table[:, 4])
 
 
+def test_a_hundred_million_impacts_are_mapped(tmp_path: Path) -> None:
+    """A file of 13.6 GB with a hole, which takes no room on the disk, and no memory here."""
+    path = tmp_path / "impacts.bin"
+    last = some(1)
+    with path.open("wb") as file:
+        file.write(some(1).tobytes())
+        file.truncate((10**8 - 1) * RECORD.itemsize)
+        file.seek(0, 2)
+        file.write(last.tobytes())
+    found = read_impacts(path)
+    assert len(found) == 10**8 and found["time"][-1] == last[0, 2] and found["time"][10**7] == 0.0
+
+
 def test_columns_are_found_by_their_names(tmp_path: Path) -> None:
     order = [*reversed(COLUMNS), "colour"]
     table = np.column_stack([some()[:, ::-1], np.ones(5)])
