@@ -262,6 +262,7 @@ def debark(
     check_places(out, plot=plot, read=(*files, grains))
     given = Given(value_or_name(speed, "rad/s", "--speed"), grains, begin, end, least_speed, stiffness or math.nan, length_ or math.nan,
                   radius or math.nan)
+    numbers = [parameter(file, against) for file in files] if against else []
     results = []
     with progress("debark", len(files)) as advance:
         for file in files:
@@ -270,8 +271,8 @@ def debark(
     written = []
     if against:
         groups: dict[float, list[Outcome]] = {}
-        for file, one in zip(files, results, strict=True):
-            groups.setdefault(parameter(file, against), []).append(one)
+        for number, one in zip(numbers, results, strict=True):
+            groups.setdefault(number, []).append(one)
         if plot:
             from .plots import save
 

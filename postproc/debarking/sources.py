@@ -53,6 +53,8 @@ def load_of(file: Path, given: Given) -> Load:
     """The load whose impacts are in `file`; DembarkError or DumpError in one line where something is missing."""
     record = read_json(file.parent / "run.json") or {}
     speed = parameter(file, given.speed) if isinstance(given.speed, str) else given.speed
+    if not speed > 0.0:
+        raise DembarkError(f"the speed of the drum of {file} is {speed:g} rad/s", "", "it must be > 0")
     impacts, period = read_impacts(file), 2.0 * math.pi / speed
     if not len(impacts):
         raise DembarkError(f"{file} holds no impact")

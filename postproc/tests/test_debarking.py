@@ -279,7 +279,7 @@ def drums(runs: Path) -> Path:
             other = runs / folder / one.name
             shutil.copytree(one, other)
             record = {"time_step": 0.01 * slower, "steps": 1000,
-                      "parameters": {"drum_speed": math.pi / slower, "filling": 0.3, "model": "x"}}
+                      "parameters": {"drum_speed": math.pi / slower, "filling": 0.3, "model": "x", "rest": 0.0}}
             (other / "run.json").write_text(json.dumps(record))
             file = next(other.glob("impacts.*"))
             impacts = np.array(read_impacts(file))
@@ -325,6 +325,8 @@ def test_figure_compares_degrees_of_debarking() -> None:
     (["--clears", "2 mm", "--against", "model"], "has no number of the name 'model'"),
     (["--against", "filling"], "give --clears or --energy"),
     (["--clears", "2 mm", "--against", "filling", "--out", "d.nc"], "with --against there is no --out"),
+    (["--speed", "rest"], "the speed of the drum of slow/replica-1/impacts.bin is 0 rad/s"),
+    (["--speed", "drum_sped"], "has no number of the name 'drum_sped', did you mean drum_speed?"),
     (["--radius", "1.3 m"], "--stiffness is missing")])
 def test_mistakes_of_a_comparison_are_one_line(drums: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str) -> None:
     assert main([*COMPARED, *words]) == 2
