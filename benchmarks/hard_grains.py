@@ -93,7 +93,7 @@ def layered(p: Mapping[str, Any], seed: int, *, beta: float, contact_duration: f
     position = np.column_stack([across, (level + 1.0) * size])
     mass = p["grain_density"] * np.pi / 6 * diameter**3
     reach = p["motion_gamma"] * p["gravity"] / (2 * np.pi * frequency)**2
-    plate = HardWall(point=(0, 0, 0), normal=(0, 0, 1),
+    plate = HardWall(point=(0, 0, 0), normal=(0, 0, 1), friction=p["wall_friction"],
                      motion=f"harmonic amplitude 0 0 {reach!r} frequency {frequency} ramp {p['motion_ramp']}")
     layer = HardGrains(mass, diameter / 2, position, random.normal(size=position.shape) * 0.05, restitution=p["restitution"],
                        restitution_speed=restitution_speed, friction=p["grain_friction"], tangential_restitution=beta,
@@ -103,7 +103,7 @@ def layered(p: Mapping[str, Any], seed: int, *, beta: float, contact_duration: f
     motion = layer.run(periods / frequency, samples=PHASES * periods)
     waves = Waves(np.array([surface_levels(frame, p["layer_length"], p["layer_depth"], d)
                             for frame in frames(motion.position[:-1], diameter / 2, mass)]), p["layer_length"], d)
-    power = np.ptp(motion.wall_work[[0, -1], 0]) / (mass.sum() * p["gravity"] * reach * 2 * np.pi * periods)
+    power = np.diff(motion.wall_work[[0, -1], 0])[0] / (mass.sum() * p["gravity"] * reach * 2 * np.pi * periods)
     return (float(np.average(motion.position[:-1, :, 2], weights=mass, axis=1).mean() / d), float(power), amplitude(waves.harmonic()),
             wave_amplitude(waves).value, amplitude(float(waves.noise().sum())))
 

@@ -49,7 +49,7 @@ def test_the_map_compares_with_the_results_of_a_campaign(tmp_path, capsys):
 
 LAYER = {"grain_diameter": 0.005, "grain_diameter_spread": 0.1, "grain_density": 2500.0, "gravity": 9.81,
          "layer_length": 0.05, "layer_depth": 0.02, "layer_height": 2.0, "motion_frequency": 10.0, "motion_gamma": 3.0, "motion_ramp": 2.0,
-         "run_in": 1, "periods": 8, "restitution": 0.5, "grain_friction": 0.5, "youngs_modulus": 2e7}
+         "run_in": 1, "periods": 8, "restitution": 0.5, "grain_friction": 0.5, "wall_friction": 0.5, "youngs_modulus": 2e7}
 
 
 def test_a_layer_of_one_grain_bounces_on_the_plate_as_a_block_that_sticks():
