@@ -144,6 +144,17 @@ def test_the_experiment_itself_passes() -> None:
     assert names(verdicts(), "pass") == {"energy_growth", "leaked"}
 
 
+def test_what_the_record_misses_its_own_volume_by_is_uncertainty_of_the_data() -> None:
+    """13 mm of water at P1 instead of 1.3 mm would be 3 % of its impulse: 0.013 m ρ g times 0.6 s of 2.88 kPa s."""
+    known, p = dam.due(defaults("dam_break_box")), defaults("dam_break_box")
+    time, pressure = dam.units(p)
+    assert known["impulse_P1"].half * pressure * time == pytest.approx(1.3e-3 * 9810.0 * 0.6)
+    assert known["impulse_P1"].half / known["impulse_P1"].value == pytest.approx(0.003, abs=5e-4)
+    assert known["impulse_P3"].half / known["impulse_P3"].value == pytest.approx(0.029, abs=1e-3)
+    assert all(0.008 < known[f"level_error_{name}"].half < 0.04 for name in GAUGES)
+    assert "U_D = 0.0" in study()["impulse_P1"]["detail"]
+
+
 def test_spacings_that_disagree_decide_nothing() -> None:
     found = [list(verdicts(weak=weak).values()) for weak in (1.3, 0.8, 1.0)]
     points = [{"parameters": defaults("dam_break_box", resolution=number), "quantities": one}

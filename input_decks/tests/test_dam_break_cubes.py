@@ -73,11 +73,17 @@ def verdicts(cubes: str, **changes: Any) -> dict[str, dict[str, Any]]:
 
 
 def test_the_experiment_itself_passes() -> None:
-    every = {"half_fallen", "rise", "floor_wetted", "inside", "leaked", "energy_growth"}
+    every = {"half_fallen", "rise", "inside", "leaked", "energy_growth"}
     three, six = verdicts("three"), verdicts("six")
     assert every | {"three_rms_x"} <= names(three, "pass"), three
-    assert every | {"six_rms_x", "gap_filled"} <= names(six, "pass"), six
+    assert every | {"six_rms_x"} <= names(six, "pass"), six
     assert three["half_fallen"]["value"] == pytest.approx(1.10, abs=0.02)
+
+
+def test_dry_gaps_and_a_dry_floor_are_seen_and_not_judged() -> None:
+    for cubes, name, changes in (("six", "gap_filled", {"shut": True}), ("three", "floor_wetted", {"dry": True})):
+        wet, dry = verdicts(cubes)[name], verdicts(cubes, **changes)[name]
+        assert wet["value"] > 0.9 and dry["value"] < 0.6 and wet["verdict"] == dry["verdict"] == "info" and wet["reference"] is None
 
 
 def test_the_worst_replica_counts_where_nothing_may_happen() -> None:
@@ -222,8 +228,6 @@ def controls_dam_break_cubes(_folder: Path) -> Iterator[Control]:
         yield Control("cubes that the water carries along 0.12 m too far", right, verdicts(cubes, carried=0.08))
     yield Control("a stack that falls a tenth of a second late", three, verdicts("three", late=0.1))
     yield Control("a top cube that jumps", six, verdicts("six", jumps=0.075))
-    yield Control("gaps that water does not enter", six, verdicts("six", shut=True))
-    yield Control("a dry floor", three, verdicts("three", dry=True))
     yield Control("a particle in a cube", three, verdicts("three", within=1))
     yield Control("a particle that leaks out", three, verdicts("three", leaked=1))
     yield Control("a fall that the spacing decides", study(2.19), study(2.17, 1.0))

@@ -139,6 +139,9 @@ class Declared:
     tolerance : largest allowed deviation from the reference, relative unless `absolute`; "bound": a bound that the theory gives for the
         parameters of the run, which the measurement computes; None: nothing to pass or fail
     why : the reason of the tolerance
+    input_uncertainty : by how much inputs that the source does not state change the deviation, 95 % half-width in its unit; part of the
+        interval of the comparison with the reference, not of that of the value
+    inputs : which they are, and what was run
     agreement : largest allowed difference of two engines where nothing is random, in the unit of the value or, with `agreement_of`, in that
     compared : whether engines are compared in it
     control : wrong physics that fails it, as tests prove; a check without any is not counted
@@ -152,6 +155,8 @@ class Declared:
     evidence: str = ""
     tolerance: float | str | None = None
     why: str = ""
+    input_uncertainty: float = 0.0
+    inputs: str = ""
     absolute: bool = False
     source: str = ""
     detail: str = ""

@@ -247,6 +247,12 @@ class CaseReader(TableReader):
             raise self.fail(table, f"tolerance = {found.tolerance!r} is negative", 'give a number >= 0, or "bound"')
         elif found.tolerance and not found.why:
             raise self.fail(table, "a tolerance without why", "say where the deviation that it allows comes from")
+        if not found.input_uncertainty >= 0.0:
+            raise self.fail(table, f"input_uncertainty = {found.input_uncertainty!r} is negative", "give a number >= 0")
+        if found.input_uncertainty and not (found.inputs and isinstance(found.tolerance, float)):
+            raise self.fail(table, "input_uncertainty needs inputs and a tolerance that is a number", "say which inputs were changed")
+        if found.input_uncertainty and found.input_uncertainty >= float(found.tolerance or 0.0):
+            raise self.fail(table, "input_uncertainty is not below the tolerance, so that nothing could pass", "leave out the tolerance")
         return found
 
     def families(self, quantities: Mapping[str, Declared]) -> None:

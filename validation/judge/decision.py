@@ -13,8 +13,8 @@ PACKINGS = 3
 _MOST = 1000
 
 
-def decides(deviation: float, own: float, reference: float, tolerance: float, basis: str) -> str:
-    """What decides a check whose deviation has the half-widths `own` of the value, with this `basis`, and `reference`.
+def decides(deviation: float, own: float, reference: float, tolerance: float, basis: str, known: str = "a reference") -> str:
+    """What decides a check whose deviation has the half-widths `own` of the value, with this `basis`, and `reference`, of what is `known`.
 
     All in the unit of the tolerance. A deviation that stays as it is passes once all of its interval is within the tolerance, and fails
     once all of it is beyond or its half-width is no more than that.
@@ -24,7 +24,7 @@ def decides(deviation: float, own: float, reference: float, tolerance: float, ba
     count, excess = packings(basis), abs(deviation) - tolerance
     target = -excess if excess < 0.0 else max(tolerance, excess)
     if reference >= target:
-        return f"a reference known to {_limits(target, reference)}"
+        return f"{known} known to {_limits(target, reference)}"
     wanted = math.sqrt(target**2 - reference**2)
     enough, longer = f"{PACKINGS} packings or more", f"runs about {max((own / wanted) ** 2, 1.1):.2g} times as long"
     if count < PACKINGS or not math.isfinite(own):

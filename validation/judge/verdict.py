@@ -58,21 +58,25 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
     """
     name = name or one.name
     reference, scale, (own, of_reference) = value.reference, _scale(one, value), _halves(one, value)
-    tolerance, half = _tolerance(one, value, name), math.hypot(own, of_reference)
+    tolerance, half = _tolerance(one, value, name), math.hypot(own, of_reference, one.input_uncertainty)
     deviation = None if reference is None else (value.estimate.value - reference.value) / scale
+    detail = value.detail or one.detail or one.why
+    if one.input_uncertainty and reference is not None:
+        detail += f"; U_input = {one.input_uncertainty:g}: {one.inputs}"
     verdict, reason, decided = value.verdict, value.inapplicable or value.reason, ""
     if not verdict:
         verdict = "info"
         if not reason and tolerance is not None and deviation is not None:
             verdict, reason = judge(deviation, half, tolerance)
             if verdict == "info":
-                decided = decides(deviation, own, of_reference, tolerance, value.estimate.basis)
+                known = "inputs" if one.input_uncertainty > of_reference else "a reference"
+                decided = decides(deviation, own, math.hypot(of_reference, one.input_uncertainty), tolerance, value.estimate.basis, known)
     return QuantityRecord(
         name=name, label=one.label.replace("*", part.replace("_", " ")), value=_finite(value.estimate.value), unit=one.unit,
         interval=_interval(value.estimate), basis=value.estimate.basis,
         reference=_finite(reference.value if reference else None), reference_interval=_interval(reference) if reference else None,
         deviation=_finite(deviation), deviation_kind="absolute" if one.absolute else "relative", tolerance=_finite(tolerance),
-        verdict=verdict, reason=reason, detail=value.detail or one.detail or one.why, source=one.source, evidence=one.evidence,
+        verdict=verdict, reason=reason, detail=detail, source=one.source, evidence=one.evidence,
         compared=one.compared and value.compared, control=one.control, decides=decided, samples=value.estimate.samples,
         deviation_half_width=_finite(value.half), independent=one.independent and value.half is None,
         chance=chance(half, tolerance, len(value.estimate.samples) or packings(value.estimate.basis)),

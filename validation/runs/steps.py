@@ -28,8 +28,8 @@ from dembark.validation.results import RECORD
 
 # A campaign's folder holds a copy of its file.
 CAMPAIGN_FILE = "campaign.toml"
-# What draws and lays out reports, and the code that verifies the instruments for them.
-_REPORTING = ("validation/report", "validation/campaigns/report", "validation/verification", "postproc/field_figures.py")
+# What draws and lays out reports.
+_REPORTING = ("validation/report", "validation/campaigns/report", "postproc/field_figures.py")
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,13 @@ class Step:
 
 def steps(folder: Path) -> list[Step]:
     """All steps after the runs that `plan.json` in the results folder names, each after those that it needs."""
+    plan = results.plan(folder)
     found: list[Step] = []
+    # The report of a profile includes the verification of the instruments, that of some cases or of a campaign does not.
+    if not plan.get("cases") and not (folder / CAMPAIGN_FILE).is_file():
+        found.append(Step("verification", "verify", (), folder / VERIFICATION, _of_verification, verify, (folder,)))
     planned: dict[Path, dict[str, str]] = {}
-    for run in results.plan(folder).get("runs", ()):
+    for run in plan.get("runs", ()):
         planned.setdefault(Path(run["folder"]).parent, {})[Path(run["folder"]).name] = run["inputs"]
     for place, runs in planned.items():
         needs = tuple(results.run_name(place / name) for name in runs)
@@ -98,6 +102,10 @@ def studies(planned: Iterable[Path]) -> list[tuple[Study, Path, tuple[Path, ...]
     return found
 
 
+def _of_verification() -> str:
+    return inputs.of_code("validation/verification")
+
+
 def _of_series(folder: Path, name: str, runs: Mapping[str, str]) -> str:
     """Hash of the inputs of the results of a series of the case `name`: measurement, verdicts and pictures of the finished `runs`."""
     case, records = find(name), [folder / one / RECORD for one in _finished(folder, runs)]
@@ -124,8 +132,8 @@ def _of_report(folder: Path) -> str:
     """Hash of the inputs of a report: results, the states of the planned runs, the files of the cases, and the code that lays it out."""
     plan = {key: value for key, value in results.plan(folder).items() if key not in ("submitted", "runs")}
     states = [(state.folder, state.inputs, state.state, state.message) for state in results.states(folder)]
-    kept = {str(path.relative_to(folder)): inputs.content(path)
-            for path in (folder / CAMPAIGN_FILE, *sorted((folder / targets.FOLDER).glob("*")), *result_files(folder))}
+    read = (folder / CAMPAIGN_FILE, folder / VERIFICATION, *sorted((folder / targets.FOLDER).glob("*")), *result_files(folder))
+    kept = {str(path.relative_to(folder)): inputs.content(path) for path in read}
     cases = [path for path in files() if path.parent.name in {name.split("/")[0] for name in kept}]
     drawing = [str(path) for case in cases if (path := case.with_name("figures.py")).is_file()]
     return inputs.digest(plan, states, kept, {path.parent.name: inputs.content(path) for path in cases},
@@ -198,6 +206,15 @@ def compare_engines(folder: Path, sources: Sequence[Path]) -> None:
         write(target, replace(comparison.compare(folder), measured=provenance.measured(), inputs_hash=inputs_hash))
 
 
+def verify(folder: Path) -> None:
+    """Verify the instruments and write `verification.json` into a results folder; RunError when that fails."""
+    with _in_one_line("the instruments could not be verified"):
+        # Its libraries are those of an extra.
+        from dembark.validation import verification
+
+        verification.write(folder, inputs_hash=_of_verification())
+
+
 def build_report(folder: Path) -> None:
     """Write report.html and report.pdf into a results folder (results/<profile> or a campaign's); RunError when that fails."""
     inputs_hash, page = _of_report(folder), folder / "report.html"
@@ -205,14 +222,10 @@ def build_report(folder: Path) -> None:
     page.unlink(missing_ok=True)
     with _in_one_line(f"the report of {folder} could not be built"):
         # Its libraries are those of an extra.
-        from dembark.validation import report, verification
+        from dembark.validation import report
         from dembark.validation.campaigns.report import build as campaign_report
 
-        campaign = (folder / CAMPAIGN_FILE).is_file()
-        # The report of a profile includes the verification of the instruments, that of some cases does not.
         if results.plan(folder).get("cases"):
             (folder / VERIFICATION).unlink(missing_ok=True)
-        elif not campaign:
-            verification.write(folder)
-        (campaign_report if campaign else report).build(folder)
+        (campaign_report if (folder / CAMPAIGN_FILE).is_file() else report).build(folder)
         write_atomic(page, inputs.stamp(page.read_text(encoding="utf-8"), inputs_hash).encode())

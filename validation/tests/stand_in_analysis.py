@@ -45,8 +45,8 @@ def build(folder):
     (folder / "report.pdf").write_text("pdf")
 
 
-def write(folder):
-    pass
+def write(folder, found=None, inputs_hash=""):
+    (folder / "verification.json").write_text(json.dumps({"items": [], "inputs_hash": inputs_hash}))
 
 
 STAND_INS = [("verification", write), ("metrics", measure), ("metrics", picture), ("metrics", study), ("judge.comparison", compare),

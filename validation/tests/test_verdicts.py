@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,6 +48,20 @@ def test_engines_with_fewer_than_three_packings_are_not_compared(other, packings
     # What was planned with more, and did not finish or has no interval, is open.
     assert pair(entry(1.0, 0.01, single), entry(other, 0.01), "liggghts", "yade", planned=5).standing == "open"
     assert pair(entry(1.0, None), entry(other, 0.01), "liggghts", "yade", planned=5).standing == "open"
+
+
+def test_inputs_that_a_source_does_not_state_widen_the_interval_that_is_judged():
+    declared = Declared("q", "q", evidence="experiment", tolerance=0.1, why="scatter", absolute=True, source="A. Author (2000)")
+    value = Value(over_replicas([Estimate(one, 0.0) for one in (1.04, 1.05, 1.06)]), Estimate(1.0, 0.01))
+    known = judged(declared, value)
+    assert known.verdict == "pass" and "U_input" not in known.detail
+    unknown = judged(replace(declared, input_uncertainty=0.08, inputs="friction 0.1 and 0.5"), value)
+    assert unknown.verdict == "info" and unknown.reason.startswith("its interval (±0.084")
+    assert unknown.detail.endswith("U_input = 0.08: friction 0.1 and 0.5") and unknown.interval == known.interval
+    # Neither more packings nor a better reference decides it.
+    assert unknown.decides == "inputs known to ±0.05, now ±0.081"
+    # Without a reference there is nothing to widen.
+    assert "U_input" not in judged(replace(declared, input_uncertainty=0.08, inputs="friction"), Value(value.estimate)).detail
 
 
 @pytest.mark.parametrize(("deviation", "half", "samples"), [(0.3, 0.3, False), (0.02, 0.2, False), (0.3, 0.3, True), (0.02, 0.2, True)])

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from dembark.common.files import read_json, write_json
+from dembark.validation.judge.inputs import KEY
 from dembark.validation.judge.result import QuantityRecord, from_json
 from dembark.validation.judge.tally import VERIFICATION as FILE
 
@@ -37,9 +38,10 @@ def items() -> list[Item]:
     return [compute() for compute in ITEMS]
 
 
-def write(results: Path, found: list[Item] | None = None) -> None:
-    """Compute all items, unless they are `found` already, and write them to `verification.json` in a results folder."""
-    write_json(results / FILE, {"items": [asdict(item) for item in (items() if found is None else found)]})
+def write(results: Path, found: list[Item] | None = None, inputs_hash: str = "") -> None:
+    """Compute all items, unless they are `found` already, and write them to `verification.json` in a results folder, with the hash of the
+    code that computed them."""
+    write_json(results / FILE, {"items": [asdict(item) for item in (items() if found is None else found)], KEY: inputs_hash})
 
 
 def read(results: Path) -> list[Item]:

@@ -89,7 +89,7 @@ class Chain:
 
         self.results.mkdir(exist_ok=True)
         write_json(self.results / PLAN, Plan("quick", (one,), {}).as_json())
-        return one, steps(self.results)[0]
+        return one, next(step for step in steps(self.results) if step.kind == "measure")
 
     def __call__(self) -> tuple[int, int, bool]:
         """How many runs and measurements were made, and whether anything was."""
@@ -241,8 +241,9 @@ def test_a_report_is_built_anew_when_a_verdict_changes_and_kept_otherwise(
             edit(box / "case.toml", "tolerance = 0.1", after)
         code, out, error = command("validate")
         assert code == 0, error
-        facts.append((report.stat().st_mtime_ns, "1 FAILED" in out, error.count("1: finished in"), (tmp_path / "measured").read_text()))
+        facts.append((report.stat().st_mtime_ns, "1 FAILED" in out, error.count("1: finished in"), (tmp_path / "measured").read_text(),
+                      error.count("verification: finished in")))
     times = [one[0] for one in facts]
     assert times[0] == times[1] < times[2] == times[3]
-    assert [one[1:] for one in facts] == [(False, 1, "x"), (False, 0, "x"), (True, 0, "x"), (True, 0, "x")]
+    assert [one[1:] for one in facts] == [(False, 1, "x", 1), (False, 0, "x", 0), (True, 0, "x", 0), (True, 0, "x", 0)]
     assert read_json(tmp_path / "results/quick/box/dry/liggghts/metrics.json")["inputs_hash"]

@@ -41,7 +41,7 @@ def test_all_runs_then_none_again_then_only_what_changed(tmp_path: Path, command
         "box/dry/liggghts/metrics.json", "box/dry/yade/metrics.json", "box/wet/liggghts/metrics.json"]
     assert read_json(results / "box/dry/comparison.json")["engines"] == ["liggghts", "yade"]
     assert not (results / "box/wet/comparison.json").exists()
-    assert error.count("finished in") == 3 + 3 + 1 + 1  # runs, measurements, a comparison and the report
+    assert error.count("finished in") == 3 + 3 + 1 + 1 + 1  # runs, measurements, a comparison, the verification and the report
     made = {path: path.stat().st_mtime_ns for path in results.glob("*/*/*/replica-1/run.json")}
 
     code, out, error = command("validate", "--profile", "quick")
