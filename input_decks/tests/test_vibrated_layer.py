@@ -16,6 +16,7 @@ from dembark.input_decks.common.momentum import unexplained_energy
 from dembark.input_decks.common.vibration import PHASES
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.input_decks.vibrated_layer.layer import read
+from dembark.postproc import DumpError
 
 layer = module("vibrated_layer")
 D, STRIDE, STILL = 0.005, 10, 4
@@ -24,9 +25,10 @@ FAST = 5.0
 
 
 def shaken(height: Callable[[float], float] = lambda _: 0.5, *, part: float = 0.5, waves: int = 4, noise: float = 0.05, lost: float = 0.0,
-           lasting: Callable[[float], bool] = lambda _: True, **changes: Any) -> Any:
+           work: float = 0.0, lasting: Callable[[float], bool] = lambda _: True, **changes: Any) -> Any:
     """A run with a standing wave of the amplitude `height(gamma)` (d), `waves` on the length, at `part` of the frequency of the drive; two
-    layers of grains are enough for its surface. `lost`: share of all works that no force explains; `lasting(gamma)`: whether waves stay, or
+    layers of grains are enough for its surface. `lost`: share of all works that no force explains; `work` (J) of the plate in a period;
+    `lasting(gamma)`: whether waves stay, or
     come anew, elsewhere, in each window of eight periods."""
     given = defaults("vibrated_layer", **{"periods": 16, "level_ramp": 2, "run_in": 0, "motion_ramp": 2} | changes)
     random, length = np.random.default_rng(7), given["layer_length"]
@@ -47,7 +49,9 @@ def shaken(height: Callable[[float], float] = lambda _: 0.5, *, part: float = 0.
         return one
 
     frames = [frame(k) for k in range((STILL + planned[0].start) * PHASES, (STILL + planned[-1].start + given["periods"]) * PHASES + 1)]
-    rows = {name: np.zeros(300) for name in ("other", "imposed")} | {"balance": np.full(300, lost), "scale": np.ones(300)}
+    count = frames[-1].step // STRIDE + 1
+    rows = {name: np.zeros(count) for name in ("other", "imposed")} | {"balance": np.full(count, lost), "scale": np.ones(count)}
+    rows |= {"step": STRIDE * np.arange(count), "walls": work * np.arange(count) / PHASES}
     derived = {"period_steps": STRIDE * PHASES, "rest_periods": STILL, "plate_speed": 0.3}
     return SimpleNamespace(folder="run", parameters=given, derived=derived, time_step=1e-4, grains=lambda: frames, times=lambda: rows)
 
@@ -64,6 +68,23 @@ def test_waves_are_measured_as_they_are() -> None:
     assert found["coherence"]["value"] == pytest.approx(1.0)
     assert found["wavelength_over_height"]["verdict"] == "info"
     assert "flat_peak" not in found
+
+
+def test_power_and_height_of_a_layer() -> None:
+    """Grains of 1 kg in two layers, 3.5 d high on average, take 2 J in a period."""
+    found = verdicts(noise=0.0, work=2.0, motion_frequency=FAST)
+    weight = 2 * 50 * 4 * 9.81
+    speed = 3.0 * 9.81 / (2.0 * math.pi * FAST)
+    assert found["power"]["value"] == pytest.approx(2.0 * FAST / (weight * speed)) and found["height"]["value"] == pytest.approx(3.5)
+    assert "power" not in sweep(2.5)
+
+
+def test_a_layer_needs_rows_at_the_ends_of_its_periods() -> None:
+    run = shaken()
+    rows = run.times()
+    run.times = lambda: rows | {"step": rows["step"] + 1}
+    with pytest.raises(DumpError, match="no rows at the ends of the periods"):
+        layer.measure([run])
 
 
 def panel(waves: int, part: float) -> dict[str, Any]:

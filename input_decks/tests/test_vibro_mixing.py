@@ -13,7 +13,7 @@ import pytest
 
 from dembark.input_decks.common.momentum import unexplained_energy
 from dembark.input_decks.common.vibration import PHASES
-from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.validation.case import deck
 from dembark.validation.case.folders import find
 from dembark.validation.case.resolve import resolve
@@ -99,6 +99,27 @@ def test_large_and_dense_grains_have_no_source() -> None:
     assert verdicts(3, swaps=0, rising=-0.1, **DENSE | {"size_ratio": 2.0})["segregation_end"]["verdict"] == "info"
 
 
+def trend(along: str, quantity: str, values: tuple[float, ...], half: float = 0.02) -> dict[str, Any]:
+    """The study along `along` of runs with these `values` of a quantity, at ratios of 1.5, 2, 3 ... ."""
+    points = [point({along: ratio}, {quantity: value}, half) for ratio, value in zip((1.5, 2.0, 3.0), values, strict=True)]
+    name = {"size_ratio": "size", "density_ratio": "density"}[along]
+    return judged("vibro_mixing", mixing.study(name, points[::-1], along))
+
+
+def test_large_grains_that_rise_faster_have_a_trend() -> None:
+    found = trend("size_ratio", "rise_rate", (0.05, 0.10, 0.20))["size_trend"]
+    assert found["verdict"] == "pass" and found["value"] == pytest.approx(0.1) and "0.050 ± 0.020 at 1.5" in found["detail"]
+    # Within the intervals; and with means that are not in order.
+    assert trend("size_ratio", "rise_rate", (0.10, 0.10, 0.11))["size_trend"]["verdict"] == "info"
+    disordered = trend("size_ratio", "rise_rate", (0.10, 0.09, 0.30))["size_trend"]
+    assert disordered["verdict"] == "info" and "order" in disordered["reason"]
+
+
+def test_dense_grains_that_sink_deeper_have_a_trend() -> None:
+    found = trend("density_ratio", "segregation_end", (-0.05, -0.15, -0.2))["density_trend"]
+    assert found["verdict"] == "pass" and found["value"] < 0.0
+
+
 def test_the_dense_grains_of_a_set_up() -> None:
     case = find("vibro_mixing")
     packed = deck.prepare(case, resolve(case, "quick", "densities")).packing
@@ -154,3 +175,7 @@ def controls_vibro_mixing(_folder: Path) -> Iterator[Control]:
     yield Control("walls that drag upwards", verdicts(swaps=0, drift=-0.1), verdicts(swaps=0, drift=0.1))
     smooth = {"swaps": 0, "wall_friction": 0.0}
     yield Control("smooth walls that drag", verdicts(**smooth), verdicts(**smooth, drift=-0.1))
+    yield Control("large grains that rise the slower the larger they are", trend("size_ratio", "rise_rate", (0.05, 0.10, 0.20)),
+                  trend("size_ratio", "rise_rate", (0.20, 0.10, 0.05)))
+    yield Control("dense grains that end the higher the denser they are", trend("density_ratio", "segregation_end", (-0.05, -0.1, -0.2)),
+                  trend("density_ratio", "segregation_end", (-0.2, -0.1, -0.05)))

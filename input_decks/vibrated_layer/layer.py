@@ -23,11 +23,15 @@ SEEN = 4.0
 
 @dataclass(frozen=True)
 class Layer:
-    """One run: `levels` and the `waves` of each, `rows`: the columns of time.csv, `diameter` and `height` of the layer at rest in m;
-    `outward`: number of levels before those of the way back."""
+    """One run: `levels` and the `waves` of each; `centres` (levels, periods, PHASES): height (m) of the centre of mass over the middle of
+    the plate; `works` (levels, periods): work (J) of the plate in each period; `weight` in N; `rows`: the columns of time.csv; `diameter`
+    and `height` of the layer at rest in m; `outward`: number of levels before those of the way back."""
 
     levels: Sequence[Level]
     waves: Sequence[Waves]
+    centres: Array
+    works: Array
+    weight: float
     rows: Mapping[str, Array]
     diameter: float
     height: float
@@ -66,11 +70,20 @@ def read(replica: Replica) -> Layer:
     run = read_phases((frame.select(frame.types == 1) for frame in replica.grains()), derived["period_steps"], replica.time_step)
     d, planned = p["grain_diameter"], levels(p)
     surface = np.array([surface_levels(frame, p["layer_length"], p["layer_depth"], d) for frame in run.frames])
-    waves = []
+    centre = np.array([np.average(frame.positions[:, 2], weights=frame.masses) for frame in run.frames])
+    rows, stride = replica.times(), int(derived["period_steps"]) // PHASES
+    waves, centres, works = [], [], []
     for level in planned:
         numbers = (derived["rest_periods"] + level.start) * PHASES + np.arange(p["periods"] * PHASES)
         chosen = np.searchsorted(run.numbers, numbers)
         if chosen[-1] >= len(surface) or (run.numbers[chosen] != numbers).any():
             raise DumpError(f"{replica.folder}: grains.dump does not hold the {p['periods']} periods at the level of {level.gamma:g} g")
         waves.append(Waves(surface[chosen], p["layer_length"], d))
-    return Layer(planned, waves, replica.times(), d, p["layer_height"] * d, p["levels"])
+        centres.append(centre[chosen].reshape(-1, PHASES))
+        ends = stride * (numbers[0] + np.arange(p["periods"] + 1) * PHASES)
+        at = np.searchsorted(rows["step"], ends)
+        if at[-1] >= len(rows["step"]) or (rows["step"][at] != ends).any():
+            raise DumpError(f"{replica.folder}: time.csv has no rows at the ends of the periods at the level of {level.gamma:g} g")
+        works.append(np.diff(rows["walls"][at]))
+    weight = float(run.frames[0].masses.sum() * p["gravity"])
+    return Layer(planned, waves, np.array(centres), np.array(works), weight, rows, d, p["layer_height"] * d, p["levels"])

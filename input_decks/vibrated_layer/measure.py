@@ -11,6 +11,7 @@ from dembark.input_decks.common.momentum import unexplained_energy
 from dembark.input_decks.common.power_law import ordered
 from dembark.input_decks.common.vibration import PHASES
 from dembark.postproc.measurement import Curve, Estimate, Measurement, Numbers, Points, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.statistics import block_mean
 from dembark.postproc.studies import measured
 
 from .layer import Layer, mean_power, read, wave_amplitude
@@ -76,7 +77,9 @@ def measure(replicas: Replicas) -> Measurement:
 
 def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
     """What is measured at one level."""
-    d, height = runs[0].diameter, runs[0].height
+    d, height, frequency = runs[0].diameter, runs[0].height, p["motion_frequency"]
+    # What the plate gives in a period at the power M g V.
+    full = runs[0].weight * gamma * p["gravity"] / (2.0 * math.pi * frequency**2)
 
     def over(number: Callable[[Waves], float]) -> Estimate:
         return over_replicas([Estimate(number(one.waves[0]), math.inf, "a mode has no interval") for one in runs])
@@ -85,6 +88,8 @@ def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
         return float(np.mean([number(one.waves[0]) for one in runs]))
 
     values = {
+        "power": Value(over_replicas([block_mean(one.works[0] / full) for one in runs])),
+        "height": Value(over_replicas([block_mean(one.centres[0].mean(axis=1) / d) for one in runs])),
         "wave_amplitude": Value(over_replicas([wave_amplitude(one.waves[0]) for one in runs])),
         "harmonic_amplitude": Value(over(lambda waves: amplitude(waves.harmonic()))),
         "noise_amplitude": Value(over(lambda waves: amplitude(float(waves.noise().sum())))),
@@ -93,7 +98,7 @@ def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
     if gamma <= FLAT:
         return values | {"flat_peak": Value(exact(mean(Waves.peak)), exact(1.0))}
     lengths = over(Waves.wavelength)
-    law = quoted_length(p["motion_frequency"] * math.sqrt(height / p["gravity"]))
+    law = quoted_length(frequency * math.sqrt(height / p["gravity"]))
     values |= {"wavelength": Value(Estimate(lengths.value / d, lengths.half / d, lengths.basis)),
                "mean_wavelength": Value(over(lambda waves: waves.mean_wavelength() / d)),
                "wavelength_over_height": Value(Estimate(lengths.value / height, math.inf, lengths.basis), exact(law))}

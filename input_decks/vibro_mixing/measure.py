@@ -1,17 +1,20 @@
 """Mixing and segregation in a vibrated vessel, at one phase of each period, at which the bed lies on the floor."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dembark.input_decks.common.drive_levels import acceleration
 from dembark.input_decks.common.drive_phases import Phases, read_phases
-from dembark.input_decks.common.estimates import over_chaotic
+from dembark.input_decks.common.estimates import over_chaotic, values_and_halves
 from dembark.input_decks.common.momentum import unexplained_energy
+from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.grains import GrainFrame
-from dembark.postproc.measurement import Curve, Estimate, Measurement, Numbers, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.measurement import Curve, Estimate, Measurement, Numbers, Points, Replicas, Value, exact, over_replicas, profile
 from dembark.postproc.replica import Array, Replica, cached_per_replica
+from dembark.postproc.studies import measured, propagated
 
 from .mixing import SAMPLE, Kinds, cells, lacey_index, lower_half, mixing_rate, rate, samples, segregation, wall_drift
 
@@ -125,3 +128,22 @@ def unequal(tracks: list[Array], large: list[Kinds], p: Numbers) -> tuple[dict[s
 def curve(name: str, title: str, across: str, series: list[Array]) -> Curve:
     """Series of all runs over the periods."""
     return profile(name, title, "periods", across, np.arange(len(series[0]), dtype=float), series)
+
+
+SHOWN = {"rise_rate": "speed of the large grain (d/T)", "segregation_end": "segregation at the end"}
+# What changes along a study, and whether the source sees it rise or fall.
+TRENDS = {"size_ratio": ("rise_rate", 1), "density_ratio": ("segregation_end", -1)}
+
+
+def study(name: str, points: Points, along: str) -> Measurement:
+    """How fast a large grain rises with its size, or how far dense grains end below light ones with their density."""
+    points, place = ordered(points, along)
+    quantity, sign = TRENDS[along]
+    values, halves = values_and_halves([measured(point, quantity) for point in points])
+    slope = propagated(lambda numbers: float(np.polyfit(place, numbers, 1)[0]), values, halves)
+    listed = ", ".join(f"{value:.3f} ± {half:.3f} at {ratio:g}" for ratio, value, half in zip(place, values, halves, strict=True))
+    trend = of_sign(slope, sign)
+    if trend.verdict == "pass" and not (np.diff(sign * values) > 0.0).all():
+        trend = Value(slope, reason="the means are not in order")
+    return Measurement({f"{name}_trend": replace(trend, detail=listed)},
+                       [profile(quantity, SHOWN[quantity], along.replace("_", " "), SHOWN[quantity], place, [values], half=halves)])
