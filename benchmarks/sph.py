@@ -3,7 +3,8 @@ in processor time of one core. LAMMPS and PySPH are left out where they are not 
 
 `python -m benchmarks.sph` writes medians. All have h = 1.3 dx, artificial viscosity and the same step, all but
 LAMMPS the cubic spline; dembark diffuses the density, too, and computes densities and forces in two loops over all pairs. It is measured
-with Wendland's kernel as well, at the step that it usually takes, in a tank, whose walls are particles, and with a free body in the middle.
+with Wendland's kernel as well, at the step that it usually takes, in a tank, whose walls are particles, and with a free body in the middle;
+and on two ranks and two threads, each, with what they wait for each other.
 """
 
 from __future__ import annotations
@@ -33,11 +34,12 @@ def step_of(dx: float) -> float:
     return 0.2 * 1.3 * dx / (1.1 * SOUND)
 
 
-def dembark_rate(count: int, steps: int, *, kernel: str, walls: bool, longer: float = 1.0) -> float:
-    """Particle-steps a second (processor time) of the fluid in a cube of `count` particles a side; `longer`: than the stock code's step."""
+def dembark_rate(count: int, steps: int, *, kernel: str, walls: bool, longer: float = 1.0, threads: int = 1) -> float:
+    """Particle-steps a second of processor time, of all threads, in a cube of fluid of `count` particles a side; `longer`: than the stock
+    code's step."""
     dx = 1.0 / count
     points = lattice([0, 0, 0], [1, 1, 1], dx)
-    water = SphFluid(points, spacing=dx, sound_speed=SOUND, gravity=[0, 0, -9.81], kernel=kernel, gamma=GAMMA,
+    water = SphFluid(points, spacing=dx, sound_speed=SOUND, gravity=[0, 0, -9.81], kernel=kernel, gamma=GAMMA, threads=threads,
                      pressure=9810.0 * (1.0 - points[:, 2]) if walls else 0.0)
     if walls:
         water.add_wall(tank_walls([0, 0, 0], [1, 1, 1 + 4 * dx], dx))
@@ -73,11 +75,12 @@ def subjects(count: int, steps: int) -> dict[str, Callable[[], Sample]]:
     """What is compared, the stock code first; a sample is a rate."""
     ours, clock = find("liggghts"), with_clock()
 
-    def coupled(block: int) -> float:
-        return engine_rate([*clock, ours.executable], "sph_coupled.in", count, steps, ours.environment(), block=block)
+    def coupled(block: int, ranks: int = 1) -> float:
+        launcher: Sequence[str | Path] = ours.launcher(ranks) if ranks > 1 else []
+        return engine_rate([*launcher, *clock, ours.executable], "sph_coupled.in", count, steps, ours.environment(), block=block) / ranks
 
-    def own(kernel: str, walls: bool = False, longer: float = 1.0) -> float:
-        return dembark_rate(count, steps, kernel=kernel, walls=walls, longer=longer)
+    def own(kernel: str, walls: bool = False, longer: float = 1.0, threads: int = 1) -> float:
+        return dembark_rate(count, steps, kernel=kernel, walls=walls, longer=longer, threads=threads)
 
     found: dict[str, Callable[[], float]] = {
         "stock LIGGGHTS": lambda: engine_rate([*clock, stock_liggghts()], "sph.in", count, steps, os.environ),
@@ -88,6 +91,9 @@ def subjects(count: int, steps: int) -> dict[str, Callable[[], Sample]]:
         "dembark, Wendland C2, at twice the step": lambda: own("wendland_c2", longer=2.0),
         "dembark, Wendland C2, at twice the step, in a tank": lambda: own("wendland_c2", walls=True, longer=2.0),
     }
+    if (os.cpu_count() or 1) > 1:
+        found["dembark in LIGGGHTS, cubic spline, delta = 0.1, each of two ranks"] = lambda: coupled(0, ranks=2)
+        found["dembark, Wendland C2, delta = 0.1, each of two threads"] = lambda: own("wendland_c2", threads=2)
     if not absent(["lammps"]):
         lammps = find("lammps")
         found["LAMMPS, sph/taitwater"] = lambda: engine_rate([lammps.executable], "sph_lammps.in", count, steps, lammps.environment())

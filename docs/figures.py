@@ -1,5 +1,5 @@
 """Draws the figures of the documentation into figures/: friction curves, capillary force curves, error maps of their models,
-and schemes of integration.
+schemes of integration, and predicted pressures.
 
 The first error map shows figures/capillary_errors.csv, which capillary_errors.py computes; the schemes of integration are those of
 figures/schemes.json, which benchmarks/schemes.py computes.
@@ -30,6 +30,7 @@ from dembark.physics.young_laplace import bridge, rupture_gap
 Map = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], str]  # volumes, gaps, percent and title
 
 FOLDER = Path(__file__).with_name("figures")
+PREDICTION = FOLDER.parents[1] / "input_decks/dam_break_box/prediction.csv"
 STYLE = {"font.size": 8, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False, "lines.linewidth": 1.2,
          "savefig.dpi": 130, "figure.constrained_layout.use": True}
 STIFFNESS, AREA, STRENGTH = 1e5, 1e-8, 1e8  # N/m, m^2, Pa
@@ -177,6 +178,23 @@ def schemes() -> None:
     save(figure, "schemes")
 
 
+def far_wall() -> None:
+    """Pressures that the case dam_break_box predicts on the far wall, with three spacings."""
+    table = np.genfromtxt(PREDICTION, delimiter=",", names=True)
+    figure, axes = plt.subplots(2, 2, figsize=(7.2, 4.6), sharex=True)
+    for axis, height in zip(axes.ravel(), (3, 15, 30, 80), strict=True):
+        for particles, style in ((16, ":"), (22, "--"), (32, "-")):
+            axis.plot(table["time"], table[f"z{height}_{particles}"], style, color="0.2", label=f"{particles} particles over the depth")
+        axis.set_title(f"{height} mm")
+        axis.set_ylim(0.0)
+    axes[0, 0].legend()
+    for axis in axes[1]:
+        axis.set_xlabel(r"$t\,\sqrt{g/H}$")
+    for axis in axes[:, 0]:
+        axis.set_ylabel(r"$p / (\rho g H)$")
+    save(figure, "far_wall_pressure")
+
+
 def main() -> None:
     """Draw all figures."""
     FOLDER.mkdir(exist_ok=True)
@@ -186,6 +204,7 @@ def main() -> None:
         error_map()
         ratio_map()
         schemes()
+        far_wall()
 
 
 if __name__ == "__main__":

@@ -112,7 +112,7 @@ def agglomerates():
 
 contacts = agglomerates() if p.contacts == "spheres" else boxes()
 water = SphFluid(spacing=p.spacing, soundSpeed=p.sound_speed, density=p.fluid_density, smoothing=p.smoothing, alpha=p.alpha, delta=p.delta,
-                 noSlip=p.no_slip == "yes", tension=p.tension == "yes", slitPressure=p.slit_pressure,
+                 noSlip=p.no_slip == "yes", tension=p.tension == "yes", moment=p.moment, slitPressure=p.slit_pressure,
                  kernel=p.kernel, boundary=p.boundary, xsph=p.xsph, shepard=p.shepard,
                  threads=int(os.environ.get("OMP_NUM_THREADS", "1")))
 if p.coupling == "potential":

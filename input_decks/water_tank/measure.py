@@ -167,7 +167,7 @@ def study(name: str, points: Points, along: str) -> Measurement:
     points, place = ordered(points, along)
     p = points[0]["parameters"]
     quantity, due = {"still": ("pressure_rms", 0.0), "floating": ("displaced_volume", p["body_density"] / p["fluid_density"]),
-                     "cylinder": ("added_mass", 1.0), "slot": ("slot_error", 0.0)}[name.removesuffix("_wide")]
+                     "cylinder": ("added_mass", 1.0), "slot": ("slot_error", 0.0)}[name.split("_", maxsplit=1)[0]]
     errors = np.abs([measured(point, quantity).value - due for point in points])
     return Measurement({f"{name}_converges": Value(exact(float(errors[-1] / errors[0])), exact(0.0))},
                        [PowerLawFit(place, errors, 0.0 * errors).curve("error", "Error", "particles across", "deviation from theory")])

@@ -302,6 +302,9 @@ void PairSphCoupled::store(bool moved) {
   }
 }
 
+/// Of each atom.
+int PairSphCoupled::numbers_to_ghosts() const { return walls_to_ghosts_ ? 4 : scene_.settings.corrects() ? 2 : 1; }
+
 int PairSphCoupled::pack_comm(int n, int *atoms, double *to, int, int *) {
   const Solids &walls = scene_.solids[0];
   double *at = to;
@@ -314,14 +317,15 @@ int PairSphCoupled::pack_comm(int n, int *atoms, double *to, int, int *) {
       *at++ = met.x, *at++ = met.y, *at++ = met.z;
     } else {
       *at++ = role == SphRole::fluid ? scene_.fluid.density[k] : wall ? walls.density[k] : 0.0;
+      if (scene_.settings.corrects()) *at++ = role == SphRole::fluid ? scene_.fluid.correction[k] : 1.0;
     }
   }
-  return walls_to_ghosts_ ? 4 : 1;
+  return numbers_to_ghosts();
 }
 
 void PairSphCoupled::unpack_comm(int n, int first, double *from) {
   Solids &walls = scene_.solids[0];
-  const int size = walls_to_ghosts_ ? 4 : 1;
+  const int size = numbers_to_ghosts();
   for (int i = first; i < first + n; ++i, from += size) {
     const auto [role, k] = particle_[i];
     if (walls_to_ghosts_) {
@@ -330,6 +334,7 @@ void PairSphCoupled::unpack_comm(int n, int first, double *from) {
       walls.met[k] = vector(from + 1);
     } else if (role == SphRole::fluid) {
       scene_.fluid.density[k] = from[0];
+      if (scene_.settings.corrects()) scene_.fluid.correction[k] = from[1];
     } else if (role == SphRole::solid) {
       walls.density[k] = from[0];
     }

@@ -68,6 +68,7 @@ class PairSphCoupled : public Pair {
   void sort_particles();
   void load();
   void store(bool moved);
+  int numbers_to_ghosts() const;
 
   std::vector<std::string> words_;
   bool all_types_ = false;  // until the first pair_coeff behind a restart file

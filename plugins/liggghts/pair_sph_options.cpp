@@ -36,6 +36,7 @@ Settings read_fluid_settings(const std::vector<std::string> &words, int dimensio
     else if (of == "alpha") s.alpha = in.number(of, "the coefficient");
     else if (of == "delta") s.delta = in.number(of, "the coefficient");
     else if (of == "boundary") s.boundary = Boundary(in.choice(of, "the pressure of walls", boundary_names()));
+    else if (of == "moment") s.moment = Moment(in.choice(of, "what gradients are divided by", moment_names()));
     else if (of == "no_slip") s.no_slip = in.choice(of, "the value", no_yes) == 1;
     else if (of == "shifting") s.shifting.coefficient = in.number(of, "the coefficient");
     else if (of == "xsph") s.xsph.epsilon = in.number(of, "epsilon");
@@ -49,7 +50,7 @@ Settings read_fluid_settings(const std::vector<std::string> &words, int dimensio
     } else {
       refuse("'" + of +
              "' is no keyword; known are spacing, sound_speed, density, gamma, tension, smoothing, kernel, alpha, delta, "
-             "boundary, no_slip, shifting, xsph, shepard and coupling");
+             "boundary, no_slip, moment, shifting, xsph, shepard and coupling");
     }
   }
   if (s.spacing == 0.0) refuse("spacing (m) is missing: that of the lattice that the fluid begins as");

@@ -71,6 +71,7 @@ nb::tuple kernel_table(const Kernel& kernel, const Array& r) {
 void bind_sph(nb::module_& m) {
   m.def("sph_kernels", &kernel_names);
   m.def("sph_boundaries", &boundary_names);
+  m.def("sph_moments", &moment_names);
   // W and W'(r)/r.
   m.def(
       "sph_kernel",
@@ -97,7 +98,7 @@ void bind_sph(nb::module_& m) {
           [](Solver* self, Points positions, Array densities, Points velocities, int dimension, double spacing, double smoothing,
              const std::string& kernel, double density, double sound_speed, double gamma, bool tension, double alpha, double delta,
              const Three& gravity, const std::string& boundary, bool no_slip, double shifting, double contact_stiffness,
-             int contact_exponent, double skin, int threads, double slit_pressure, double xsph, int shepard,
+             int contact_exponent, double skin, int threads, double slit_pressure, double xsph, int shepard, const std::string& moment,
              const std::string& instruction_set) {
             const Settings settings{dimension,
                                     spacing,
@@ -115,13 +116,14 @@ void bind_sph(nb::module_& m) {
                                     threads,
                                     slit_pressure,
                                     {xsph},
-                                    shepard};
+                                    shepard,
+                                    Moment(option("moment", moment_names(), moment))};
             new (self) Solver(settings, vectors(positions), std::vector<double>(densities.data(), densities.data() + densities.size()),
                               vectors(velocities), instruction_set == "best" ? best_loops() : portable_loops());
           },
           "positions"_a, "densities"_a, "velocities"_a, "dimension"_a, "spacing"_a, "smoothing"_a, "kernel"_a, "density"_a, "sound_speed"_a,
           "gamma"_a, "tension"_a, "alpha"_a, "delta"_a, "gravity"_a, "boundary"_a, "no_slip"_a, "shifting"_a, "contact_stiffness"_a,
-          "contact_exponent"_a, "skin"_a, "threads"_a, "slit_pressure"_a, "xsph"_a, "shepard"_a, "instruction_set"_a)
+          "contact_exponent"_a, "skin"_a, "threads"_a, "slit_pressure"_a, "xsph"_a, "shepard"_a, "moment"_a, "instruction_set"_a)
       .def(
           "add",
           [](Solver& self, Points points, bool free, double mass, const Three& inertia, const Three& position) {

@@ -58,6 +58,7 @@ sph::Settings SphFluid::settings() const {
 	s.shepard       = shepard;
 	dembark_yade::choose("SphFluid.kernel", kernel, sph::kernel_names(), s.kernel);
 	dembark_yade::choose("SphFluid.boundary", boundary, sph::boundary_names(), s.boundary);
+	dembark_yade::choose("SphFluid.moment", moment, sph::moment_names(), s.moment);
 	if (const char* const wrong = s.error()) fail(sph_fluid::inYade(wrong));
 	return s;
 }

@@ -55,6 +55,7 @@ public:
 		((Real,gamma,7,,"Exponent of Tait's equation of state, >= 1"))
 		((bool,tension,false,,"Keep negative pressures, for closed vessels"))
 		((bool,noSlip,false,,"Viscosity acts at walls and bodies, too"))
+		((string,moment,"lattice",,"What sums over gradients are divided by: the moment of the kernel on the 'lattice', or over each particle's neighbours, 'particles'"))
 		((Real,shifting,0,,"Coefficient of shifting, 2 is usual; 0 = none"))
 		((Real,xsph,0,,"Epsilon of XSPH, 0...1: how far particles drift with the mean velocity around them; 0 = none, 0.5 is usual"))
 		((int,shepard,0,,"Steps of the fluid from one of Shepard's filters of density to the next; 0 = none, 30 is usual"))

@@ -20,6 +20,7 @@ SCENES: dict[str, Scene] = {
     "tension": dam(tension=True, delta=0.0, kernel="cubic_spline", smoothing=1.5),
     "potential": dam(**POTENTIAL),
     "older": dam(**POTENTIAL, xsph=0.5, shepard=15, delta=0.0),
+    "moment": dam(moment="particles", kernel="cubic_spline"),
     "box": box(),
 }
 
@@ -46,7 +47,7 @@ def assert_same_fluid(table: Any, scene: Scene, steps: int, tolerance: float = 1
 
 # Ranks wait for each other three times a step, which on a busy machine takes long. Neighbours are searched about every 20 steps.
 @pytest.mark.parametrize(("name", "ranks", "steps"), [*((name, 1, STEPS) for name in SCENES), ("dam", 2, STEPS), ("no_slip", 2, 60),
-                                                      ("potential", 2, 60), ("older", 2, 60), ("box", 2, 40)])
+                                                      ("potential", 2, 60), ("older", 2, 60), ("moment", 2, 60), ("box", 2, 40)])
 def test_is_the_fluid_of_the_solver(name: str, ranks: int, steps: int, tmp_path: Path) -> None:
     scene = SCENES[name]
     table, energies = solved(tmp_path, scene, steps, ranks=ranks)
@@ -77,7 +78,8 @@ def test_a_wall_that_moves_does_work(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("style", "ranks", "scene"), [("hybrid granular sph", 1, dam(shifting=2.0)), ("sph", 2, dam(shifting=2.0)),
-                                                       ("hybrid granular sph", 1, box(xsph=0.5, shepard=7))])
+                                                       ("hybrid granular sph", 1, box(xsph=0.5, shepard=7)),
+                                                       ("sph", 2, dam(moment="particles"))])
 def test_resumes_to_the_bit(style: str, ranks: int, scene: Scene, tmp_path: Path) -> None:
     """The body of `box` has unequal moments."""
 
@@ -111,6 +113,7 @@ REFUSED = {
     "spacing": ("spacing 0.02", "", "spacing (m) is missing"),
     "sound": ("sound_speed 30.0", "", "sound_speed (m/s) is missing"),
     "number": ("spacing 0.02", "spacing wide", "dx (m) must be a number, not 'wide'"),
+    "moment": ("sound_speed 30.0 ", "sound_speed 30.0 moment own", "what gradients are divided by can be lattice or particles, not 'own'"),
     "kernel": ("sound_speed 30.0 ", "sound_speed 30.0 kernel gauss", "the kernel can be wendland_c2 or cubic_spline, not 'gauss'"),
     "empty body": ("fix body3 g3", "group none type 99\nfix body3 none", "its group has no atoms"),
     "no mass": ("mass 6.4 ", "", "mass is missing"),

@@ -34,8 +34,9 @@ struct LoopArguments {
   int dimension = 3;
   double h = 1.0;
   PairCoefficients pair{};
-  double volume = 0.0;                     ///< m/rho_0, of shifting
+  double volume = 0.0;                     ///< m/rho_0, of sums over places
   double* rate = nullptr;                  ///< of density, kg/m^3/s
+  double* diffused = nullptr;              ///< its part by diffusion, with Places
   Quad* shift = nullptr;                   ///< grad C and divergence of positions; of xsph_pairs
   Quad* sum = nullptr;                     ///< accelerations (m/s^2), or what the loop says
   Vec3<double>* velocity_sum = nullptr;    ///< of wall_sums
@@ -97,9 +98,9 @@ DEMBARK_HOT Vec3<P> spread(double x, double y, double z) {
   return {P(x), P(y), P(z)};
 }
 
-/// Rates of density of fluid pairs, and of both with Shift the sums of shifting. a: s of diffusion, b: p/rho^2. Returns the power that
-/// diffusion takes out of the compression energy over m (W/kg).
-template <class P, class Kernel, bool Shift>
+/// Rates of density of fluid pairs; with Places that of diffusion apart, and the sums of shifting. a: s of diffusion, b: p/rho^2. Returns
+/// the power that diffusion takes out of the compression energy over m (W/kg).
+template <class P, class Kernel, bool Places>
 double density_pairs(const LoopArguments& in) {
   const Kernel kernel(in.dimension, in.h);
   P lost(0.0);
@@ -107,7 +108,7 @@ double density_pairs(const LoopArguments& in) {
     const Record& own = in.own[i];
     const Vec3<P> x = spread<P>(own.x, own.y, own.z), v = spread<P>(own.vx, own.vy, own.vz);
     const P s(own.a), pressure(own.b);
-    P rate(0.0), cx(0.0), cy(0.0), cz(0.0), divergence(0.0);
+    P rate(0.0), diffused(0.0), cx(0.0), cy(0.0), cz(0.0), divergence(0.0);
     const int row = i - in.begin;
     for (int k = in.start[row]; k < in.start[row + 1]; k += 4) {
       const int* const j = in.neighbour + k;
@@ -115,18 +116,20 @@ double density_pairs(const LoopArguments& in) {
       const Vec3<P> d = x - other.x;
       const P squared = dot(d, d), slope = kernel.slope(sqrt(squared)), push = P(in.pair.mass) * slope;
       const P compression = compression_rate(push, dot(v - other.v, d)), diffusion = diffusion_rate(in.pair, push, s, other.a);
-      rate += compression + diffusion;
-      const P back = compression - diffusion;
+      const P back = Places ? compression : compression - diffusion;
+      rate += Places ? compression : compression + diffusion;
       for (int l = 0; l < 4; ++l) in.rate[j[l]] += back[l];
       lost -= diffusion * (pressure - other.b);
-      if constexpr (Shift) {
+      if constexpr (Places) {
         const P weight = P(in.volume) * slope, wx = weight * d.x, wy = weight * d.y, wz = weight * d.z, spread_out = -(weight * squared);
-        cx += wx, cy += wy, cz += wz, divergence += spread_out;
+        cx += wx, cy += wy, cz += wz, divergence += spread_out, diffused += diffusion;
+        for (int l = 0; l < 4; ++l) in.diffused[j[l]] -= diffusion[l];
         scatter(in.shift, j, -wx, -wy, -wz, spread_out);
       }
     }
     in.rate[i] += total(rate);
-    if constexpr (Shift) {
+    if constexpr (Places) {
+      in.diffused[i] += total(diffused);
       Quad& q = in.shift[i];
       q = {q.x + total(cx), q.y + total(cy), q.z + total(cz), q.w + total(divergence)};
     }
@@ -135,7 +138,7 @@ double density_pairs(const LoopArguments& in) {
 }
 
 /// What solid particles add to the rates of fluid ones, or fluid ones to those of solid ones.
-template <class P, class Kernel, bool Shift>
+template <class P, class Kernel, bool Places>
 double density_across(const LoopArguments& in) {
   const Kernel kernel(in.dimension, in.h);
   for (int i = in.begin; i < in.end; ++i) {
@@ -149,13 +152,13 @@ double density_across(const LoopArguments& in) {
       const Vec3<P> d = x - other.x;
       const P squared = dot(d, d), slope = kernel.slope(sqrt(squared));
       rate += compression_rate(P(in.pair.mass) * slope, dot(v - other.v, d));
-      if constexpr (Shift) {
+      if constexpr (Places) {
         const P weight = P(in.volume) * slope;
         cx += weight * d.x, cy += weight * d.y, cz += weight * d.z, divergence -= weight * squared;
       }
     }
     in.rate[i] += total(rate);
-    if constexpr (Shift) {
+    if constexpr (Places) {
       Quad& q = in.shift[i];
       q = {q.x + total(cx), q.y + total(cy), q.z + total(cz), q.w + total(divergence)};
     }
@@ -305,7 +308,7 @@ double wall_sums(const LoopArguments& in) {
 /// The loops for one instruction set, with Wendland's kernel and the cubic spline, in the order of KernelName.
 struct Loops {
   typedef double (*Loop)(const LoopArguments&);
-  Loop density_pairs[2][2], density_across[2][2];  ///< [kernel][with shifting]
+  Loop density_pairs[2][2], density_across[2][2];  ///< [kernel][Places]
   Loop force_pairs[2], force_across[2][2];         ///< [kernel][slip]
   Loop wall_sums[2];
   Loop xsph_pairs[2], shepard_pairs[2];

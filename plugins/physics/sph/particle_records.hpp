@@ -43,6 +43,7 @@ struct LoopNumbers {
   PairCoefficients pair{};
   double at_spacing = 1.0;  ///< W(dx)
   double spray = 0.0;       ///< kg/m^3, the lowest density without tension
+  double moment = 1.0;      ///< of the lattice
 };
 
 /// Density of a fluid particle after dt (s) at the rate (kg/m^3/s). Without tension nothing holds what flies apart, and errors of steps and
@@ -89,7 +90,7 @@ inline LoopNumbers loop_numbers(const Settings& s) {
     PairCoefficients pair = PairCoefficients::of(s.mass(), moment, s.h(), s.state.sound_speed, s.state.density, s.alpha, s.delta);
     if (s.boundary == Boundary::extrapolated) pair.guard = 0.25 * s.state.sound_speed * s.state.sound_speed / s.state.density;
     pair.reach = 0.9 * s.spacing;
-    return LoopNumbers{pair, kernel.value(s.spacing), 0.5 * (s.state.density + s.mass() * kernel.value(0.0))};
+    return LoopNumbers{pair, kernel.value(s.spacing), 0.5 * (s.state.density + s.mass() * kernel.value(0.0)), moment};
   });
 }
 

@@ -12,7 +12,7 @@ namespace dembark::sph {
 /// For a process that has all particles. Where processes share them, the engine gives an object of the same form, which sends the numbers
 /// of particles to their images on other processes.
 struct OneProcess {
-  void send_densities(Scene&) const {}  ///< of fluid and solids[0]
+  void send_densities(Scene&) const {}  ///< of fluid, with its `correction` if there is one, and solids[0]
   void send_walls(Scene&) const {}      ///< `pressure` and `met` of solids[0]
   /// Pa, of the particles of boxes (Slits), from all processes.
   const std::vector<double>& box_pressures(const Scene& scene) const { return scene.solids[0].pressure; }
@@ -29,6 +29,7 @@ class Passes {
   /// and what the fluid and its films do to bodies: of this process `force` and `torque`, of all `film` and `film_torque`.
   template <class Images>
   void compute(Scene& scene, double dt, Images&& images) {
+    if (dt > 0.0 || scene.settings.corrects()) rates(scene, dt);
     if (dt > 0.0) {
       densities(scene, dt);
       images.send_densities(scene);
@@ -37,6 +38,8 @@ class Passes {
         images.send_densities(scene);
       }
       pressures(scene, scene.fluid.size());
+    } else if (scene.settings.corrects()) {
+      images.send_densities(scene);
     }
     walls(scene);
     images.send_walls(scene);
@@ -50,6 +53,11 @@ class Passes {
   }
 
  private:
+  /// Moment of the lattice over that of a particle of the fluid.
+  static double corrected(const Scene& scene, int i) {
+    return scene.fluid.correction[i] * scene.fluid.density[i] / scene.settings.state.density;
+  }
+
   static int kernel(const Scene& scene) { return int(scene.settings.kernel); }
 
   static void pressures(Scene& scene, int first) {
@@ -58,29 +66,42 @@ class Passes {
                [&](int i) { fluid.pressure[first + i] = scene.settings.state.pressure(fluid.density[first + i]); });
   }
 
-  /// Of the fluid, and of dynamic boundary particles.
-  void densities(Scene& scene, double dt) {
+  /// Of the densities of the fluid and of dynamic boundary particles, at their places; and the corrections of the moment there.
+  void rates(Scene& scene, double dt) {
     const Settings& s = scene.settings;
     FluidParticles& fluid = scene.fluid;
-    const bool shifting = scene.shifts();
+    const bool places = scene.sums_places();
     scene.each(fluid.with_images(), [&](int i) {
       fluid.records[i] = density_record(s, fluid.position[i], fluid.velocity[i], fluid.density[i], fluid.pressure[i]);
       fluid.rate[i] = 0.0;
-      if (shifting) fluid.shift_sum[i] = {};
+      if (places) fluid.diffused[i] = 0.0, fluid.shift_sum[i] = {};
     });
     Solids& walls = scene.solids[0];
     for (int k = 0; k < walls.with_images(); ++k) walls.records[k] = solid_record(walls.position[k], walls.velocity[k]);
-    scene.lost.diffusive += dt * s.mass() * pairs(scene, loops_->density_pairs[kernel(scene)][shifting]);
-    across(scene, walls, loops_->density_across[kernel(scene)][shifting]);
+    scene.lost.diffusive += dt * s.mass() * pairs(scene, loops_->density_pairs[kernel(scene)][places]);
+    across(scene, walls, loops_->density_across[kernel(scene)][places]);
+    if (s.corrects())
+      scene.each(fluid.size(), [&](int i) { fluid.correction[i] = moment_correction(s.dimension, numbers_.moment, fluid.shift_sum[i].w); });
     if (s.boundary == Boundary::dynamic) {
       walls.rate.assign(walls.rate.size(), 0.0);
       back(scene, walls, loops_->density_across[kernel(scene)][0]);
-      for (int k = 0; k < walls.size(); ++k) walls.density[k] = boundary_density(s, walls.density[k], walls.rate[k], dt);
     }
+  }
+
+  /// From their rates, after a step of dt (s); and the shifts of the fluid.
+  void densities(Scene& scene, double dt) {
+    const Settings& s = scene.settings;
+    FluidParticles& fluid = scene.fluid;
+    Solids& walls = scene.solids[0];
+    if (s.boundary == Boundary::dynamic)
+      for (int k = 0; k < walls.size(); ++k) walls.density[k] = boundary_density(s, walls.density[k], walls.rate[k], dt);
     scene.each(fluid.size(), [&](int i) {
-      fluid.density[i] = fluid_density(s, numbers_, fluid.density[i], fluid.rate[i], dt);
+      double& rate = fluid.rate[i];
+      if (s.corrects()) rate *= corrected(scene, i);
+      if (scene.sums_places()) rate += fluid.diffused[i];
+      fluid.density[i] = fluid_density(s, numbers_, fluid.density[i], rate, dt);
       fluid.pressure[i] = s.state.pressure(fluid.density[i]);
-      if (shifting) {
+      if (scene.shifts()) {
         const Quad& q = fluid.shift_sum[i];
         fluid.shift[i] = shift(s.shifting, s.dimension, s.h(), s.spacing, dt, fluid.velocity[i], {q.x, q.y, q.z}, q.w);
       }
@@ -160,6 +181,9 @@ class Passes {
       const double rho = s.boundary == Boundary::extrapolated ? wall_density(s.state, set.pressure[k]) : set.density[k];
       set.records[k] = force_record(set.position[k], set.met[k], rho, set.pressure[k]);
     }
+    // Solid particles have the moment of the lattice.
+    FluidParticles& fluid = scene.fluid;
+    if (s.corrects()) scene.each(fluid.with_images(), [&](int i) { fluid.records[i].a *= corrected(scene, i); });
     const int slip = s.no_slip ? 0 : 1;
     scene.lost.viscous += dt * s.mass() * pairs(scene, loops_->force_pairs[kernel(scene)]);
     across(scene, set, loops_->force_across[kernel(scene)][slip]);
@@ -222,6 +246,7 @@ class Passes {
     in.volume = scene.settings.mass() / scene.settings.state.density;
     in.own = in.others = scene.fluid.records.data();
     in.rate = scene.fluid.rate.data();
+    in.diffused = scene.fluid.diffused.data();
     in.shift = scene.fluid.shift_sum.data();
     in.sum = scene.fluid.sum.data();
     return in;

@@ -18,7 +18,8 @@ struct FluidParticles {
   std::vector<Vector> position, velocity;  ///< m, m/s
   std::vector<double> density, pressure;   ///< kg/m^3, Pa
   std::vector<Record> records;             ///< and one far away, as with the sums
-  std::vector<double> rate;                ///< of density, kg/m^3/s
+  std::vector<double> rate, diffused;      ///< of density, kg/m^3/s; its diffusion apart where moments are summed
+  std::vector<double> correction;          ///< moment_correction()
   std::vector<Quad> sum, shift_sum;        ///< accelerations but for gravity, m/s^2; of shifting, of XSPH
   // Of its own particles.
   std::vector<int> id;                      ///< number as they were given
@@ -40,13 +41,17 @@ struct Scene {
   long step = 0;    ///< number of the last step, or of that under way, from 1 on
 
   bool shifts() const { return settings.shifting.coefficient > 0.0; }
+  /// Whether the rates of density come with sums over the places of neighbours.
+  bool sums_places() const { return shifts() || settings.corrects(); }
   /// After a search: room for records and sums. far (m): a place beyond the reach of all particles.
   void resize(const Vector& far) {
     const std::size_t n = fluid.position.size() + 1;
     fluid.records.resize(n);
     fluid.rate.resize(n);
     fluid.sum.resize(n);
-    if (settings.displaces()) fluid.shift_sum.resize(n);
+    if (settings.displaces() || sums_places()) fluid.shift_sum.resize(n);
+    if (sums_places()) fluid.diffused.resize(n);
+    if (settings.corrects()) fluid.correction.resize(n, 1.0);
     fluid.records.back() = far_record(far);
     for (Solids& set : solids) {
       set.resize();

@@ -9,6 +9,7 @@
 
 #include "contact_potential.hpp"
 #include "kernels.hpp"
+#include "moment.hpp"
 #include "shifting.hpp"
 #include "state.hpp"
 #include "vector.hpp"
@@ -35,10 +36,13 @@ struct Settings {
   double slit_pressure = 1.0;  ///< xi of the films in slits, 0 ... 1
   Xsph xsph{};
   int shepard = 0;  ///< steps from one filter of density to the next, 0: none
+  Moment moment = Moment::lattice;
 
   double h() const { return smoothing * spacing; }
   /// Whether particles are displaced beyond what their velocities do.
   bool displaces() const { return shifting.coefficient > 0.0 || xsph.on(); }
+  /// Whether the moments of the particles are computed.
+  bool corrects() const { return moment == Moment::particles; }
   /// Of a particle, kg (in the plane kg/m).
   double mass() const { return state.density * std::pow(spacing, dimension); }
   /// Largest stable time step (s) of sound: the highest frequency of the lattice is below 2.2 c_0/h, and 2 over it is the limit of the
@@ -74,7 +78,8 @@ struct Settings {
                                                 {"threads", threads != other.threads},
                                                 {"slit_pressure", slit_pressure != other.slit_pressure},
                                                 {"xsph", xsph.epsilon != other.xsph.epsilon},
-                                                {"shepard", shepard != other.shepard}};
+                                                {"shepard", shepard != other.shepard},
+                                                {"moment", moment != other.moment}};
     const auto found = std::find_if(std::begin(all), std::end(all), [](const auto& one) { return one.second; });
     return found == std::end(all) ? nullptr : found->first;
   }

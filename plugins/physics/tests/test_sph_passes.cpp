@@ -14,7 +14,7 @@ namespace {
 
 /// What processes send to each other, by the numbers of the particles in the scene of one process.
 struct Sent {
-  std::vector<std::vector<double>> densities;  // of the fluid, each time that they are sent
+  std::vector<std::vector<double>> densities, corrections;  // of the fluid, each time that they are sent
   std::vector<double> wall_density, wall_pressure;
   std::vector<Vector> met;
 };
@@ -23,6 +23,7 @@ struct Recorder {
   Sent* sent;
   void send_densities(Scene& scene) const {
     sent->densities.push_back(scene.fluid.density);
+    sent->corrections.push_back(scene.fluid.correction);
     sent->wall_density = scene.solids[0].density;
   }
   void send_walls(Scene& scene) const {
@@ -43,6 +44,7 @@ struct Receiver {
   const Process* own;
   mutable std::size_t times = 0;
   void send_densities(Scene& scene) const {
+    if (scene.settings.corrects()) receive(sent->corrections[times], own->fluid, scene.fluid.size(), scene.fluid.correction);
     receive(sent->densities[times++], own->fluid, scene.fluid.size(), scene.fluid.density);
     receive(sent->wall_density, own->solids[0], scene.solids[0].size(), scene.solids[0].density);
   }
@@ -171,6 +173,7 @@ TEST_CASE("SPH passes: two processes that share the particles get what one gets"
       s.xsph = {0.5};
       s.shepard = 1;
       if (potential) s.contact = {1e5, 2};
+      else s.moment = Moment::particles;
       const Scene scene = tank(s);
       const double dt = 0.5 * s.longest_step(), cut = 0.43;
       Process one = process(scene, [](const Vector&) { return true; });

@@ -8,6 +8,7 @@
 
 #include "dembark/sph/contact_potential.hpp"
 #include "dembark/sph/kernels.hpp"
+#include "dembark/sph/moment.hpp"
 #include "dembark/sph/pair_terms.hpp"
 #include "dembark/sph/shepard.hpp"
 #include "dembark/sph/shifting.hpp"
@@ -197,6 +198,13 @@ TEST_CASE("SPH XSPH: two particles exchange as much momentum of drift", "[sph]")
   }
   CHECK(std::string(Xsph{1.1}.error()) == "xsph must be between 0 and 1");
   CHECK(Xsph{NAN}.error() != nullptr);
+}
+
+TEST_CASE("SPH moment: a larger one is taken back, a surface is left alone", "[sph]") {
+  CHECK_THAT(moment_correction(2, 0.974, 2.0 * 0.974), WithinRel(1.0, 1e-15));
+  CHECK_THAT(moment_correction(3, 0.979, 3.0 * 0.979 * 1.01), WithinRel(1.0 / 1.01, 1e-12));
+  CHECK(moment_correction(2, 0.974, 1.0) == 1.0);
+  CHECK(moment_correction(3, 0.979, 0.0) == 1.0);
 }
 
 TEST_CASE("SPH Shepard: its weights sum to one, a uniform density stays, and none leaves the range around it", "[sph]") {

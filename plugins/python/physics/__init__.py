@@ -14,7 +14,7 @@ from dembark.physics.lcp import LCP_METHODS, LcpCertificate, LcpResult, LcpSolve
 from dembark.physics.liquid import LIQUID_RETURNS, LIQUID_SHARES, LiquidBridge, liquid_bridge, liquid_grant, liquid_share
 from dembark.physics.motion import WallMotion
 from dembark.physics.normal import effective_shear_modulus, effective_youngs_modulus
-from dembark.physics.sph import SPH_BOUNDARIES, SPH_KERNELS, SphBody, SphEnergies, SphFluid, sph_kernel, tait_pressure
+from dembark.physics.sph import SPH_BOUNDARIES, SPH_KERNELS, SPH_MOMENTS, SphBody, SphEnergies, SphFluid, sph_kernel, tait_pressure
 from dembark.physics.viscous import ViscousResistance, viscous_resistance
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "LIQUID_SHARES",
     "SPH_BOUNDARIES",
     "SPH_KERNELS",
+    "SPH_MOMENTS",
     "AdamsEvent",
     "AdamsSolution",
     "Body",

@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 
 SPH_KERNELS: tuple[str, ...] = tuple(_physics.sph_kernels())
 SPH_BOUNDARIES: tuple[str, ...] = tuple(_physics.sph_boundaries())
+SPH_MOMENTS: tuple[str, ...] = tuple(_physics.sph_moments())
 # Of the longest step that the scheme allows, 0.6 h/c, what is taken when none is given: 0.4 h/(c + c/10).
 _USUAL_STEP = 0.4 / 1.1 / 0.6
 
@@ -252,6 +253,7 @@ class SphFluid:
     delta : of the diffusion of density; 0.1 is usual
     gamma, tension : of the equation of state; with tension pressures may be negative, for closed vessels
     no_slip : viscosity acts at walls and bodies, too
+    moment : one of `SPH_MOMENTS`: what sums over gradients are divided by; "particles" corrects them where particles have left the lattice
     shifting : coefficient, 2 is usual; 0 = none
     xsph : epsilon, 0 ... 1: how far particles drift with the mean velocity around them; 0.5 is usual, 0 = none
     shepard : steps from one filter of density to the next; 30 is usual, 0 = none
@@ -273,7 +275,8 @@ class SphFluid:
     def __init__(self, positions: ArrayLike, *, spacing: float, sound_speed: float, density: float = 1000.0,
                  gravity: ArrayLike | None = None, velocity: ArrayLike = 0.0, pressure: ArrayLike = 0.0, smoothing: float = 1.3,
                  kernel: str = "wendland_c2", alpha: float = 0.02, delta: float = 0.1, gamma: float = 7.0, tension: bool = False,
-                 boundary: str = "extrapolated", no_slip: bool = False, shifting: float = 0.0, xsph: float = 0.0, shepard: int = 0,
+                 boundary: str = "extrapolated", no_slip: bool = False, moment: str = "lattice", shifting: float = 0.0,
+                 xsph: float = 0.0, shepard: int = 0,
                  contact_stiffness: float = 0.0, contact_exponent: int = 4, threads: int = 1, skin: float = 0.2, slit_pressure: float = 1.0,
                  instruction_set: str = "best") -> None:
         points = _points("positions", positions)
@@ -296,7 +299,7 @@ class SphFluid:
         self._solver = _physics.SphSolver(
             points, densities, velocities, self._dimension, spacing, smoothing, kernel, density, sound_speed, gamma, tension, alpha, delta,
             np.append(weight, 0.0)[:3].tolist(), boundary, no_slip, shifting, contact_stiffness, contact_exponent, skin, threads,
-            slit_pressure, xsph, shepard, instruction_set)
+            slit_pressure, xsph, shepard, moment, instruction_set)
 
     def add_wall(self, points: ArrayLike) -> SphBody:
         """A wall of particles at `points` (m, (k, d)), at rest until its `set_motion`; torques and turns are about the origin."""

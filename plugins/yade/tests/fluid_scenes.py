@@ -52,7 +52,7 @@ def tell(fluid, body):
 
 def falling_plane():
     """A turning block falls into water, in the plane."""
-    fluid = pool((0, -G, 0), (0, 0), (0.4, 0.12), 0.4, delta=0.1, alpha=0.05, noSlip=True)
+    fluid = pool((0, -G, 0), (0, 0), (0.4, 0.12), 0.4, delta=0.1, alpha=0.05, noSlip=True, moment="particles")
     low = (0.14, 0.22)
     body = block((low[0] + 0.05, low[1] + 0.05, 0), 8.0, (0.0133, 0.0133, 0.0133), (0.2, -1.0 + 0.5 * STEP * G, 0), (0, 0, 2.0), plane=True)
     fluid.addBody(body, dembark.lattice(low, (low[0] + 0.1, low[1] + 0.1), DX))

@@ -44,7 +44,7 @@ def assert_same(water, body, told, steps):
 
 
 def test_a_block_falls_in_the_plane_as_in_the_solver(found):
-    water = pool([0, 0], [0.4, 0.12], 0.4, delta=0.1, alpha=0.05, no_slip=True)
+    water = pool([0, 0], [0.4, 0.12], 0.4, delta=0.1, alpha=0.05, no_slip=True, moment="particles")
     body = water.add_body(lattice([0.14, 0.22], [0.24, 0.32], DX), mass=8.0, inertia=0.0133, centre=[0.19, 0.27])
     body.set_motion([0.2, -1.0], 2.0)
     assert_same(water, body, found["falling_plane"], 800)

@@ -47,7 +47,8 @@ def splash(**options):
 
 
 @pytest.mark.parametrize("options", [{}, {"kernel": "cubic_spline", "shifting": 2.0, "no_slip": True}, {"boundary": "dynamic"},
-                                     {"xsph": 0.5, "shepard": 10}])
+                                     {"xsph": 0.5, "shepard": 10},
+                                     {"moment": "particles"}])
 def test_every_processor_and_number_of_threads_gets_the_same_bits(options):
     states = []
     for more in ({}, {"instruction_set": "portable"}, {"threads": 2}):
@@ -264,7 +265,7 @@ def test_momentum_of_a_free_cloud_is_conserved(seed, dimension, kernel):
     random = np.random.default_rng(seed)
     points = lattice([0] * dimension, [0.1] * dimension, DX) + random.uniform(-0.2, 0.2, (5**dimension, dimension)) * DX
     cloud = SphFluid(points, spacing=DX, sound_speed=20.0, alpha=0.3, kernel=kernel, velocity=random.uniform(-1, 1, points.shape),
-                     pressure=random.uniform(0.0, 2e4, len(points)), xsph=0.5, shepard=5)
+                     pressure=random.uniform(0.0, 2e4, len(points)), xsph=0.5, shepard=5, moment="particles")
     before = cloud.velocities
     cloud.run(0.01)
     middle = points.mean(axis=0) + 0.01 * before.mean(axis=0)

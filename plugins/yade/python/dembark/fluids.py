@@ -60,7 +60,7 @@ def fluid(p, points, depth=None, dimension=2):
     """A fluid in the plane, or in space, with the parameters of the group `fluid`, `spacing` and `sound_speed`, and particles at `points`
     (m), below the level `depth` (m) with the pressure of rest. Up is the last axis."""
     water = SphFluid(spacing=p.spacing, soundSpeed=p.sound_speed, dimension=dimension, density=p.fluid_density, smoothing=p.smoothing,
-                     alpha=p.alpha, delta=p.delta, noSlip=p.no_slip == "yes", tension=p.tension == "yes",
+                     alpha=p.alpha, delta=p.delta, noSlip=p.no_slip == "yes", tension=p.tension == "yes", moment=p.moment,
                      threads=int(os.environ.get("OMP_NUM_THREADS", "1")))
     level, up = depth or 0.0, dimension - 1
     water.addParticles(points, pressures=[p.fluid_density * p.gravity * max(level - point[up], 0.0) for point in points])
