@@ -44,6 +44,9 @@ COLUMN = {"grain_count": 60, "column_width": 0.021, "column_depth": 0.021, "sett
 BED = {"plate_width": 0.15, "outlet_width": 0.03, "fill_height": 0.03, "confinement": 0.34, "settle_time": 0.12, "discharge_time": 0.12,
        "restart_every": 200}
 
+# Killed under load: the integrals of the stresses that are lacking, and the sums of a row, are in the state.
+SPECIMEN = {"grain_count": 100, "inertial_number": 0.01, "strain": 0.1, "frames": 11, "restart_every": 333}
+
 # Killed when the water is at the cubes. Densities of dynamic boundary particles, contacts of agglomerates and the steps of the filter of
 # density are in the state.
 CUBES = {"spacing": 0.0375, "column_length": 0.4125, "column_height": 0.3, "distance": 0.15, "downstream_length": 0.6,
@@ -132,7 +135,8 @@ def test_no_grain_falls_through_the_base_after_a_restart(case: str, values: dict
         ("gravity_channel", "liggghts", 2, CHANNEL), ("gravity_channel", "yade", 1, CHANNEL), ("log_pile", "liggghts", 1, PILE),
         ("log_pile", "yade", 1, PILE), ("angle_of_repose", "liggghts", 1, BED), ("angle_of_repose", "yade", 1, BED),
         ("silo", "lammps", 2, SILO), ("plug_flow", "lammps", 1, PLUG), ("gravity_channel", "lammps", 1, CHANNEL),
-        ("column_collapse", "lammps", 1, COLUMN), ("dam_break_cubes", "liggghts", 2, CUBES), ("dam_break_cubes", "yade", 1, CUBES)])])
+        ("column_collapse", "lammps", 1, COLUMN), ("dam_break_cubes", "liggghts", 2, CUBES), ("dam_break_cubes", "yade", 1, CUBES),
+        ("triaxial", "yade", 1, SPECIMEN)])])
 def test_killed_run_goes_on_to_the_same_bytes(case: str, engine: str, ranks: int, values: dict[str, Any], both: Any) -> None:
     whole, broken, step = both(case, engine, values, ranks)
     if case == "log_pile":

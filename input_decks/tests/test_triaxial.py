@@ -86,10 +86,10 @@ def of_stresses(cohesion: float, bridge_volume: float = 0.0) -> dict[str, dict[s
 
 def controls_triaxial(_: Path) -> Iterator[Control]:
     lattice = verdicts(**LATTICE)
-    yield Control("friction of the lattice off", lattice, verdicts(**LATTICE, friction=0.0))
-    yield Control("contacts of the lattice half as stiff", lattice, verdicts(**LATTICE, stiffness=0.5))
+    yield Control("a fiftieth of the friction of the lattice lost", lattice, verdicts(**LATTICE, friction=0.294))
+    yield Control("contacts of the lattice a tenth softer", lattice, verdicts(**LATTICE, stiffness=0.9))
     yield Control("contacts four times as stiff", verdicts(stiffness=0.7), verdicts(stiffness=2.8))
-    yield Control("cohesion of a fifth of the stress", of_stresses(0.0), of_stresses(0.2))
+    yield Control("cohesion of a twentieth of the stress", of_stresses(0.0), of_stresses(0.05))
     yield Control("stress across that is not held", verdicts(), verdicts(held=1.02))
     yield Control("a fiftieth of the contacts lost", verdicts(), verdicts(lost=0.02))
 

@@ -74,18 +74,25 @@ def _points(sweep: SweepSpec, where: str) -> Iterator[Point]:
             twin = seen.setdefault(tuple(resolved.values()), name)
             if twin != name:
                 raise DembarkError(f"points {twin} and {name} are the same run", where, "remove one of them")
-            own = _packings(sweep, number, changes, resolved)
+            own = _packings(sweep, number, changes, resolved, where)
             axes = {"variant": base, **row} if len(sweep.variants) > 1 else dict(row)
             yield Point(sweep, name, base, axes, {**changes, **own}, {**resolved, **own}, quantiles)
 
 
-def _packings(sweep: SweepSpec, number: int, changes: Mapping[str, Value], resolved: Mapping[str, Value]) -> Mapping[str, Value]:
+def _packings(sweep: SweepSpec, number: int, changes: Mapping[str, Value], resolved: Mapping[str, Value],
+              where: str) -> Mapping[str, Value]:
     """The seed of the point with this `number` (from 0) of a calibration, whose packings are its own: some that all points shared would
-    shift the results of all alike, and a fit would take that for an effect of the parameters."""
+    shift the results of all alike, and a fit would take that for an effect of the parameters. DembarkError for one that the case does not
+    allow."""
     seed = resolved.get("seed")
     if not (sweep.sample and sweep.sample.targets) or not isinstance(seed, int) or "seed" in changes:
         return {}
-    return {"seed": seed + number * int(resolved.get("replicas") or 1)}
+    replicas = int(resolved.get("replicas") or 1)
+    own, most = seed + number * replicas, sweep.case.parameters["seed"].max
+    if most is not None and own > most:
+        raise DembarkError(f"point {number + 1} of {where} has packings with the seeds {own} and on, the largest is {most:g}",
+                           "each point of a calibration has packings of its own", "lower samples, replicas or the seed of the profile")
+    return {"seed": own}
 
 
 def points(spec: CampaignSpec) -> list[Point]:

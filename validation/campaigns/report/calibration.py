@@ -33,6 +33,8 @@ COMBINED = 0.8
 PREDICTED = 0.8
 # Share of the variance of a curve that its components make up, and of that of each component that is predicted.
 SHARE, LEAST_PREDICTED = 0.99, 0.3
+# Samples of the posterior of which the predictive intervals of the targets are taken, at most.
+PREDICTIVE = 2000
 # Distance of curves, in standard uncertainties, from which on the target is not reached, however its errors are correlated.
 FAR = 1.96
 
@@ -57,7 +59,8 @@ class Fitted:
 @dataclass(frozen=True)
 class Reached:
     """A target, what the surrogate gives at the most probable point, with the half-width of its 95 % interval, and the share of the
-    variance that it predicts of points that it has not seen."""
+    variance that it predicts of points that it has not seen. `low` to `high`: the posterior predictive 95 % interval, in which the
+    measurement lies that is repeated on the fitted model."""
 
     name: str
     target: float
@@ -65,13 +68,16 @@ class Reached:
     value: float
     half: float
     predicted: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
 class Fit:
     """The fit in one engine and variant: parameters, targets, and the folder name `best_run` of the point whose measurements are nearest to
     the targets; `values` (n, parameters) are samples of the posterior. `why` there is no fit, "" where there is. `curves`: names of target
-    curves, and how far they are from the most probable ones (root mean square, in standard uncertainties)."""
+    curves, and how far they are from the most probable ones (root mean square, in standard uncertainties). `points` and `runs`: what the
+    fit cost."""
 
     engine: str
     base: str
@@ -83,6 +89,8 @@ class Fit:
     density: Array | None = None
     why: str = ""
     curves: tuple[tuple[str, float], ...] = ()
+    points: int = 0
+    runs: int = 0
 
     @property
     def words(self) -> list[str]:
@@ -102,9 +110,12 @@ class Fit:
                        "more samples are needed, or more packings.")
             if abs(each.value - each.target) > each.half + 1.96 * each.uncertainty:
                 yield f"No parameters within the ranges reach the target of {each.name.replace('_', ' ')}."
+        inside = sum(each.low <= each.target <= each.high for each in self.targets)
+        yield f"The posterior predictive 95 % intervals contain {inside} of {len(self.targets)} targets."
         for name, distance in self.curves:
             yield (f"The most probable curve {name.replace('_', ' ')} is {distance:.1f} standard uncertainties from the target, root mean "
                    f"square{': no parameters within the ranges reach it' if distance > FAR else ''}.")
+        yield f"Cost: {self.points} points, {self.runs} runs."
 
 
 def fits(sweep: Sweep, spec: SweepSpec) -> list[Fit]:
@@ -136,7 +147,8 @@ def _fit(spec: SweepSpec, sample: Sample, engine: str, base: str, points: Sequen
     distance = sum((one.values - one.target) ** 2 / (one.variances + one.uncertainty**2) for one in outputs)
     drawn = np.array([one.values(known.quantiles[:, at]) for at, one in enumerate(sample.variables.values())], float).T
     return Fit(engine, base, _parameters(sample, known, drawn), tuple(_reached(known, outputs)), tuple(_combined(sample, known)),
-               complete[int(np.argmin(distance))].variant, drawn, known.density, curves=_curves(known, outputs, distances))
+               complete[int(np.argmin(distance))].variant, drawn, known.density, curves=_curves(known, outputs, distances),
+               points=len(complete), runs=sum(int(point.results[engine].provenance.get("replicas") or 1) for point in complete))
 
 
 def _complete(sample: Sample, engine: str, points: Sequence[Point]) -> tuple[list[Point], str]:
@@ -233,9 +245,15 @@ def _parameters(sample: Sample, known: Posterior, drawn: Array) -> tuple[Fitted,
 
 def _reached(known: Posterior, outputs: Sequence[Output]) -> Iterator[Reached]:
     best = known.quantiles[int(known.density.argmax())][None]
+    some = known.quantiles[::math.ceil(len(known.quantiles) / PREDICTIVE)]
+    random = np.random.default_rng(0)
     for surrogate, one in zip(known.surrogates, outputs, strict=True):
-        mean, variance = surrogate(best)
-        yield Reached(one.name, one.target, one.uncertainty, float(mean[0]), 1.96 * math.sqrt(float(variance[0])), surrogate.explained)
+        (value,), (variance,) = surrogate(best)
+        means, variances = surrogate(some)
+        again = means + np.sqrt(variances + one.uncertainty**2) * random.standard_normal(len(some))
+        low, high = np.quantile(again, [0.025, 0.975])
+        yield Reached(one.name, one.target, one.uncertainty, float(value), 1.96 * math.sqrt(variance), surrogate.explained, float(low),
+                      float(high))
 
 
 def _combined(sample: Sample, known: Posterior) -> Iterator[tuple[str, str, float]]:

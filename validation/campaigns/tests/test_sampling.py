@@ -265,6 +265,20 @@ def test_points_of_a_fit_have_packings_of_their_own(tmp_path: Path, monkeypatch:
     assert set(seeds(FIT.replace("[sweeps.sample]\n", "fixed = { seed = 7 }\n[sweeps.sample]\n") + target)) == {7}
 
 
+@pytest.mark.parametrize(("seed", "expected"), [
+    (99_988, ""), (99_989, "point 5 of [sweeps 1]"), (99_989, "has packings with the seeds 100001 and on, the largest is 100000")])
+def test_seeds_of_a_fit_stay_within_the_range_of_the_case(seed: int, expected: str, tmp_path: Path, decks: Path,
+                                                          capsys: pytest.CaptureFixture[str]) -> None:
+    text = (decks / "box/case.toml").read_text(encoding="utf-8").replace("seed = { value = 7,", f"seed = {{ value = {seed}, max = 100000,")
+    text += '[quantities]\nrepose = { label = "angle of repose", unit = "deg" }\n'
+    (decks / "box/case.toml").write_text(text, encoding="utf-8")
+    path = write(tmp_path, SAMPLE.replace("[[sweeps]]\n", "[[sweeps]]\nreplicas = 3\n") + (
+        "[sweeps.sample.targets]\nrepose = { value = 30.0, uncertainty = 1.0 }\n"))
+    assert main(["calibrate", str(path), "--dry-run"]) == (2 if expected else 0)
+    error = capsys.readouterr().err
+    assert error.count("\n") == (1 if expected else 0) and expected in error
+
+
 def test_a_fit_needs_targets_and_a_design_that_fills_the_ranges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                                                 capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.delenv("DEMBARK_DECKS")
