@@ -70,7 +70,7 @@ def points(along: str, *pairs: tuple[float, float]) -> list[dict[str, Any]]:
 
 def test_a_bed_that_turns_as_a_body(tmp_path: Path) -> None:
     found = measured(trough(tmp_path, noise=5e-5), **GRAIN)
-    assert names(found, "pass") == {"energy_balance", "likeness"}
+    assert names(found, "pass") == {"energy_balance", "momentum_balance", "likeness"}
     omega = 2.0 * np.pi * 12.5
     assert found["circulation"]["value"] == pytest.approx(0.5 / omega, rel=0.05)
     assert found["revolution"]["value"] == pytest.approx(0.5 / omega, rel=0.1)
