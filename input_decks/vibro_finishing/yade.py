@@ -1,4 +1,4 @@
-"""Vibratory finishing: grains and a free part in a trough that moves on a circle; the energies of all forces are booked."""
+"""Vibratory finishing: grains and a free part in a trough that moves on a circle; with a sphere as part all energies are booked."""
 
 import math
 
