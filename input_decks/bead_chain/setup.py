@@ -1,60 +1,88 @@
-"""Bead chain: spheres that touch, side by side along x, or rows of them in a hexagonal layer, and the time that the wave needs."""
+"""Bead chain: spheres that touch, side by side along x, or planes of them in a lattice, and the time that the wave needs."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from dembark.input_decks.common.packing import Packing
-from dembark.input_decks.common.setup import Parameters, Setup, contacts, strides, time_step
+from dembark.input_decks.common.setup import Array, Parameters, Setup, contacts, strides, time_step
+
+
+class Lattice(NamedTuple):
+    """Planes of spheres across x, which lie in each other's hollows in turn: the contacts of a sphere with those of the next plane, and the
+    cosine of the angle between these contacts and x."""
+
+    contacts: int
+    cosine: float
+
+
+# fcc along [001], hcp along [0001]; long waves along [111] of fcc are as fast as these.
+LATTICES = {"row": Lattice(1, 1.0), "hexagonal": Lattice(2, math.sqrt(3.0 / 4.0)), "fcc": Lattice(4, math.sqrt(1.0 / 2.0)),
+            "hcp": Lattice(3, math.sqrt(2.0 / 3.0))}
 
 
 def setup(p: Parameters) -> Setup:
-    """Bodies and output of a row or a layer."""
-    return row(p) if p.columns == 1 else layer(p)
-
-
-def row(p: Parameters) -> Setup:
-    """The wave gets to the end of the row but for a tenth, by an estimate of its speed from that of the first sphere."""
-    d, count = p.grain_diameter, p.grain_count
-    mass, stiffness = sphere_mass(p), hertz(p)
-    # The largest force is about that of two spheres that meet at this speed.
-    force = stiffness * (1.25 * 0.5 * mass * p.hit_speed**2 / stiffness) ** 0.6
-    speed = 0.9 * d * stiffness ** (1.0 / 3.0) * force ** (1.0 / 6.0) / math.sqrt(mass)
-    output = strides(0.9 * count * d / speed, time_step(p), p.frames)
-    places = np.column_stack([d * (np.arange(count) + 0.5), np.zeros(count), np.zeros(count)])
-    speeds = np.zeros((count, 3))
-    speeds[0, 0] = p.hit_speed
-    room = 4.0 * d
-    box = np.array([(-room, count * d + room), (-room, room), (-room, room)])
-    bodies = Packing(box, places, np.full(count, d), np.full(count, p.grain_density), np.ones(count, np.int64), speeds)
-    numbers = {**output, "first": output["stride"], "stiffness": stiffness, "mass": mass, **contacts(p, skin=0.2)}
-    return Setup(output["steps"], time_step(p), bodies, numbers)
-
-
-def layer(p: Parameters) -> Setup:
-    """Rows of spheres along z, one after another along x, all contacts with the same overlap; the first half of the rows has the speed
-    along x. Of the fronts that leave both ends of that half, those that go one way meet those of the other after a quarter of all rows."""
-    apart, rows = p.grain_diameter - p.overlap, p.grain_count
-    number, place = (axis.ravel() for axis in np.meshgrid(np.arange(rows), np.arange(p.columns), indexing="ij"))
-    step = 0.5 * math.sqrt(3.0) * apart
-    places = np.column_stack([step * (number + 0.5), np.zeros(len(number)), apart * (place + 0.25 + 0.5 * (number % 2))])
+    """With an overlap of the contacts the first half of the planes has the speed along x. Of the fronts that leave both ends of that half,
+    those that go one way meet those of the other after a quarter of all planes. Without, the first plane has it, and the wave gets to the
+    end of the bed but for a tenth, by an estimate of its speed from that of the first plane."""
+    apart, planes = p.grain_diameter - p.overlap, p.grain_count
+    spacing = LATTICES[p.lattice].cosine * apart
+    across, shift, sides = plane(p.lattice, p.columns, apart)
+    number, place = (axis.ravel() for axis in np.meshgrid(np.arange(planes), np.arange(len(across)), indexing="ij"))
+    tangential = across[place] + (number % 2)[:, None] * shift
+    places = np.column_stack([spacing * (number + 0.5), np.mod(tangential, sides, out=tangential, where=sides > 0.0)])
     speeds = np.zeros_like(places)
-    speeds[number < rows // 2, 0] = p.hit_speed
+    speeds[number < (planes // 2 if p.overlap else 1), 0] = p.hit_speed
     room = 4.0 * p.grain_diameter
-    box = np.array([(0.0, rows * step), (-room, room), (0.0, p.columns * apart)])
-    count = len(number)
+    box = np.array([(0.0, planes * spacing) if p.overlap else (-room, planes * spacing + room),
+                    *((0.0, side) if side else (-room, room) for side in sides)])
+    count, stiffness = len(number), plane_stiffness(p)
     bodies = Packing(box, places, np.full(count, p.grain_diameter), np.full(count, p.grain_density), np.ones(count, np.int64), speeds)
-    output = strides(0.23 * rows / row_frequency(p), time_step(p), p.frames)
-    numbers = {**output, "first": output["stride"], "row_frequency": row_frequency(p), **contacts(p, skin=0.2)}
-    return Setup(output["steps"], time_step(p), bodies, numbers)
+    numbers = {"stiffness": stiffness, "mass": sphere_mass(p), "spacing": spacing}
+    if p.overlap:
+        numbers["row_frequency"] = row_frequency(p)
+        lasts = 0.23 * planes / row_frequency(p)
+    else:
+        # The largest force is about that of two planes that meet at this speed.
+        force = stiffness * (1.25 * 0.5 * sphere_mass(p) * p.hit_speed**2 / stiffness) ** 0.6
+        lasts = 0.9 * planes / (0.9 * stiffness ** (1.0 / 3.0) * force ** (1.0 / 6.0) / math.sqrt(sphere_mass(p)))
+    output = strides(lasts, time_step(p), p.frames)
+    return Setup(output["steps"], time_step(p), bodies, {**output, "first": output["stride"], **numbers, **contacts(p, skin=0.2)})
+
+
+def plane(lattice: str, columns: int, apart: float) -> tuple[Array, Array, Array]:
+    """Places (n, 2) along y and z in m of the spheres of a plane, `apart` (m) from each other; how far (2,) the next plane is shifted; and
+    periods (2,), 0 along an axis with one sphere."""
+    if lattice == "row":
+        return np.zeros((1, 2)), np.zeros(2), np.zeros(2)
+    if lattice == "hexagonal":
+        z = apart * (np.arange(columns) + 0.25)
+        return np.column_stack([0.0 * z, z]), np.array([0.0, 0.5 * apart]), np.array([0.0, columns * apart])
+    i, k = (axis.ravel() for axis in np.meshgrid(np.arange(columns), np.arange(columns), indexing="ij"))
+    if lattice == "fcc":
+        return (np.column_stack([apart * (i + 0.25), apart * (k + 0.25)]), np.array([0.5 * apart, 0.5 * apart]),
+                np.array([columns * apart, columns * apart]))
+    high = math.sqrt(0.75) * apart
+    return (np.column_stack([apart * (i + 0.25 + 0.5 * (k % 2)), high * (k + 0.25)]), np.array([0.5 * apart, high / 3.0]),
+            np.array([columns * apart, columns * high]))
 
 
 def row_frequency(p: Parameters) -> float:
-    """Omega (rad/s) of rows in a layer, omega = 2 Omega |sin(q/2)| for a phase q from row to row. A sphere has two neighbours in either of
-    the rows next to its own, at 30 degrees to x: Omega^2 = 2 (K cos^2 - (F/a) sin^2) / m with the contacts' stiffness K, force F and
-    length a."""
+    """Omega (rad/s) of planes that are pressed together, omega = 2 Omega |sin(q/2)| for a phase q from plane to plane. A sphere has n
+    contacts with either of the planes next to its own, at an angle to x: Omega^2 = n (K cos^2 - (F/a) sin^2) / m with the contacts'
+    stiffness K, force F and length a."""
+    number, cosine = LATTICES[p.lattice]
     force = hertz(p) * p.overlap**1.5
-    return math.sqrt(2.0 * (0.75 * 1.5 * force / p.overlap - 0.25 * force / (p.grain_diameter - p.overlap)) / sphere_mass(p))
+    across = force / (p.grain_diameter - p.overlap) * (1.0 - cosine**2)
+    return math.sqrt(number * (1.5 * force / p.overlap * cosine**2 - across) / sphere_mass(p))
+
+
+def plane_stiffness(p: Parameters) -> float:
+    """k (N/m^1.5) of two planes, F = k u^1.5 a sphere when they get closer by u from where they touch: each of the n contacts overlaps by
+    u cos, and presses along x with cos of its force."""
+    number, cosine = LATTICES[p.lattice]
+    return number * cosine**2.5 * hertz(p)
 
 
 def sphere_mass(p: Parameters) -> float:

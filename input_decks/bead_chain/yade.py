@@ -1,10 +1,10 @@
-"""Bead chain: spheres that touch in a row, of which the first has a speed; or a hexagonal layer, of which half has one."""
+"""Bead chain: spheres that touch in a row, of which the first has a speed; or a lattice of them, of which one plane or half has one."""
 
 from yade import dembark
 
 p = dembark.parameters()
-materials, ids = dembark.begin(p, along=[0, 2] if p.columns > 1 else [])
-if p.columns > 1:
+materials, ids = dembark.begin(p, along=[0] * (p.overlap > 0) + {"row": [], "hexagonal": [2]}.get(p.lattice, [1, 2]))
+if p.lattice == "hexagonal":
     dembark.block(ids[1])
 writer = dembark.FrameWriter()
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replica, Value, block_mean, exact, profile
 from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.statistics import CONFIDENCE, jackknife, joint_limit
@@ -131,6 +133,15 @@ class Trough:
         return jackknife(lambda keep: number(*fluctuation(places[keep], ways[keep], masses, edges)),
                          np.arange(len(ways)) * BLOCKS // len(ways), name="time blocks")
 
+    def momentum_gap(self, wall: str) -> float:
+        """Size of the difference, in the plane of the layer, between the change of momentum of all that moves, from the first frame to the
+        last, and the impulse of `wall` and weight, over the weight times the time between."""
+        first, last = (frame.masses @ frame.velocities for frame in (self.run.frames[0], self.run.frames[-1]))
+        impulse = [self.rows[f"{wall}_j{axis}"][-1] - self.rows[f"{wall}_j{axis}"][0] for axis in "xyz"]
+        weight = self.weight * self.periods * self.run.period
+        gap = last - first - impulse + np.array([0.0, 0.0, weight])
+        return float(np.linalg.norm(gap[[0, 2]]) / weight)
+
     def power(self, *walls: str) -> Estimate:
         """Power of the drive over M g V: work of the forces on the `walls`, period by period."""
         work = np.sum([self.rows[f"{wall}_work"] for wall in walls], axis=0)
@@ -170,11 +181,43 @@ def spectrum(forces: Array, periods: int) -> tuple[Array, Array]:
     return np.arange(len(amplitudes)) / periods, sides * (np.abs(amplitudes) ** 2).sum(axis=1) / count**2
 
 
+def joined(frame: GrainFrame, numbers: Mapping[str, float]) -> GrainFrame:
+    """A frame whose last `body_spheres` grains, the spheres of a rigid body, are one grain with its mass `body_mass` (kg): at the centre of
+    mass, from which the first and the last sphere were at (`first_x`, `first_z`) and (`last_x`, `last_z`) (m) before it turned."""
+    begin = len(frame.ids) - int(numbers["body_spheres"])
+    kept = frame.select(np.arange(len(frame.ids)) <= begin)
+    places, speeds = (values[begin:][:, [0, 2]] for values in (frame.positions, frame.velocities))
+    # Of complex numbers z + i x, whose angle grows from z to x.
+    first, last = (complex(numbers[f"{which}_z"], numbers[f"{which}_x"]) for which in ("first", "last"))
+    place, speed = (values[:, 1] + 1j * values[:, 0] for values in (places, speeds))
+    turned = (place[-1] - place[0]) / (last - first)
+    centre = place[0] - turned / abs(turned) * first
+    arm, way = place - place.mean(), speed - speed.mean()
+    spin = float((np.conj(arm) * way).imag.sum() / (np.abs(arm) ** 2).sum())
+    velocity = speed.mean() + 1j * spin * (centre - place.mean())
+
+    def ending(values: Array, last: ArrayLike) -> Array:
+        return np.concatenate([values[:-1], [last]])
+
+    positions = ending(kept.positions, [centre.imag, 0.0, centre.real])
+    return replace(kept, positions=positions, wrapped=positions, masses=ending(kept.masses, numbers["body_mass"]),
+                   velocities=ending(kept.velocities, [velocity.imag, 0.0, velocity.real]), omegas=ending(kept.omegas, [0.0, spin, 0.0]))
+
+
+def rigidity(frames: Sequence[GrainFrame], spheres: int) -> float:
+    """Largest change (m) of the distance, in the plane of the layer, between any of the last `spheres` grains and the first or last of
+    them, in any frame; a body that turns out of the plane changes these, too."""
+    places = np.array([frame.positions[-spheres:, [0, 2]] for frame in frames])
+    apart = np.linalg.norm(places[:, :, None] - places[:, None, [0, -1]], axis=3)
+    return float(np.abs(apart - apart[0]).max())
+
+
 @cached_per_replica
 def read(replica: Replica) -> Trough:
     """What was written; the free part, where there is one, is the last body."""
     given, derived = replica.parameters, replica.derived
-    run = read_phases(replica.grains(), int(derived["period_steps"]), replica.time_step)
+    frames = [joined(frame, derived) if "body_spheres" in derived else frame for frame in replica.grains()]
+    run = read_phases(frames, int(derived["period_steps"]), replica.time_step)
     times = replica.times()
     kept = times["step"] >= run.frames[0].step
     part = len(run.frames[0].ids) - 1 if derived.get("free_part") else -1

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from dembark.input_decks.bead_chain.setup import hertz, row_frequency, sphere_mass
+from dembark.input_decks.bead_chain.setup import LATTICES, hertz, plane_stiffness, row_frequency, setup, sphere_mass
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.postproc.tests.packings import frame_of
 
@@ -34,7 +34,8 @@ def run(force: float = 0.4, lost: float = 0.0, heavier: float = 1.0) -> Any:
         return frame_of(places, 0.5 * D, {}, step=4 * k)
 
     frames = [frame(k) for k in range(int(COUNT * lag / (4 * DT)))]
-    return SimpleNamespace(parameters=defaults("bead_chain"), derived={"stiffness": K, "mass": MASS}, time_step=DT, grains=lambda: frames)
+    return SimpleNamespace(parameters=defaults("bead_chain"), derived={"stiffness": K, "mass": MASS, "spacing": D}, time_step=DT,
+                           grains=lambda: frames)
 
 
 def verdicts(**changes: Any) -> dict[str, dict[str, Any]]:
@@ -49,7 +50,7 @@ def study(power: float) -> dict[str, dict[str, Any]]:
 
 def passed(stiffer: float = 1.0) -> dict[str, dict[str, Any]]:
     """A front in a layer whose springs are `stiffer` than stated."""
-    p, turn = defaults("bead_chain", grain_count=120, columns=4, hit_speed=2e-5), 2000.0
+    p, turn = defaults("bead_chain", grain_count=120, lattice="hexagonal", columns=4, overlap=5e-6, hit_speed=2e-5), 2000.0
     steps = 20 * np.arange(1, 121)
     speeds = 1e-5 * chain.lattice(120, np.sqrt(stiffer) * turn * DT * steps)
     frames = [frame_of(np.zeros((480, 3)), 0.5 * D, {}, step=int(step), velocities=np.repeat(speed, 4)[:, None] * [1.0, 0.0, 0.0])
@@ -71,19 +72,49 @@ def test_rows_swing_as_in_an_endless_lattice_until_the_fronts_meet() -> None:
     np.testing.assert_allclose(0.5 * chain.lattice(200, phases)[:, 100:110], due, atol=1e-12)
 
 
-def test_rows_are_as_stiff_as_their_contacts() -> None:
-    """The force on a row that is moved along x between two at rest, -2 m Omega^2 x a sphere, from the contacts of a sphere with both
-    neighbours in either row."""
-    p = SimpleNamespace(**defaults("bead_chain", columns=4))
+def bed(lattice: str, overlap: float) -> tuple[SimpleNamespace, Any, Any]:
+    """Parameters, the spheres of a lattice (planes, n, 3), and the ways (n, 3) from a sphere of the second plane to all, the nearest image
+    of each."""
+    p = SimpleNamespace(**defaults("bead_chain", lattice=lattice, columns=4, overlap=overlap, grain_count=30))
+    packing = setup(p).packing
+    assert packing is not None
+    ways = packing.positions - packing.positions[len(packing.positions) // 30 + 1]
+    for axis in (1, 2)[lattice == "hexagonal":]:
+        side = np.ptp(packing.box[axis])
+        ways[:, axis] -= side * np.round(ways[:, axis] / side)
+        assert (packing.positions[:, axis] > 0.0).all() and (packing.positions[:, axis] < side).all()
+    return p, packing, ways
+
+
+@pytest.mark.parametrize(("lattice", "around", "speed"), [("hexagonal", 6, 9 / 8), ("fcc", 12, 1.0), ("hcp", 12, 4 / 3)])
+def test_planes_are_as_stiff_as_their_contacts(lattice: str, around: int, speed: float) -> None:
+    """The force on a plane that is moved along x between two at rest, -2 m Omega^2 x a sphere, from the contacts of a sphere in both."""
+    p, _, ways = bed(lattice, 5e-6)
     a, moved = p.grain_diameter - p.overlap, 1e-4 * p.overlap
-    force = 0.0
-    for x, z in ((s * 0.75**0.5 * a, 0.5 * t * a) for s in (-1, 1) for t in (-1, 1)):
-        apart = np.hypot(moved - x, z)
-        force += hertz(p) * (p.grain_diameter - apart) ** 1.5 * (moved - x) / apart
+    apart = np.linalg.norm(ways, axis=1)
+    touching = (apart > 0.0) & (apart < 1.01 * a)
+    assert touching.sum() == around and apart[touching] == pytest.approx(a, rel=1e-12)
+    others = ways[touching & (np.abs(ways[:, 0]) > 0.1 * a)]
+    assert len(others) == 2 * LATTICES[lattice].contacts
+    arm = others - [moved, 0.0, 0.0]
+    length = np.linalg.norm(arm, axis=1)
+    force = -(hertz(p) * (p.grain_diameter - length) ** 1.5 * arm[:, 0] / length).sum()
     assert 2.0 * row_frequency(p) ** 2 == pytest.approx(-force / moved / sphere_mass(p), rel=1e-6)
     # Speed of long waves over a sqrt(K/m).
     stiff = 1.5 * hertz(p) * p.overlap**0.5
-    assert 0.75 * row_frequency(p) ** 2 == pytest.approx(9.0 / 8.0 * stiff / sphere_mass(p), rel=1e-3)
+    long = (LATTICES[lattice].cosine * row_frequency(p)) ** 2 * sphere_mass(p) / stiff
+    assert long == pytest.approx(speed, rel=2e-3)
+
+
+@pytest.mark.parametrize("lattice", ["fcc", "hcp"])
+def test_planes_that_get_closer_press_with_their_contacts(lattice: str) -> None:
+    """The force along x between two planes that touch, when one has moved, from the contacts of a sphere."""
+    p, _, ways = bed(lattice, 0.0)
+    moved = 1e-6 * p.grain_diameter
+    ahead = ways[(ways[:, 0] > 0.1 * p.grain_diameter) & (np.linalg.norm(ways, axis=1) < 1.01 * p.grain_diameter)] - [moved, 0.0, 0.0]
+    length = np.linalg.norm(ahead, axis=1)
+    force = (hertz(p) * np.maximum(p.grain_diameter - length, 0.0) ** 1.5 * ahead[:, 0] / length).sum()
+    assert force == pytest.approx(plane_stiffness(p) * moved**1.5, rel=1e-4)
 
 
 def test_a_known_wave() -> None:
@@ -99,9 +130,17 @@ def test_the_wave_in_an_engine(engine: str, simulate: Any) -> None:
     assert names(found, "pass") == {"wave_speed", "wave_decay"}, found
 
 
+@pytest.mark.parametrize("lattice", ["fcc", "hcp"])
 @pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
-def test_the_front_in_an_engine(engine: str, simulate: Any) -> None:
-    found = judged("bead_chain", chain.measure([simulate("bead_chain", engine, {"grain_count": 80, "frames": 100}, "front")]))
+def test_the_wave_in_a_lattice(engine: str, lattice: str, simulate: Any) -> None:
+    found = judged("bead_chain", chain.measure([simulate("bead_chain", engine, {"grain_count": 40}, f"pulse_{lattice}")]))
+    assert names(found, "pass") == {"wave_speed", "wave_decay"}, found
+
+
+@pytest.mark.parametrize("variant", ["front", "front_fcc", "front_hcp"])
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+def test_the_front_in_an_engine(engine: str, variant: str, simulate: Any) -> None:
+    found = judged("bead_chain", chain.measure([simulate("bead_chain", engine, {"grain_count": 80, "frames": 100}, variant)]))
     assert names(found, "pass") == {"front_speed", "front_profile"}, found
 
 

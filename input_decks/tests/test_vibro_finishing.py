@@ -17,10 +17,12 @@ from dembark.common.errors import DembarkError
 from dembark.input_decks.common.momentum import CONTACT_PARTS
 from dembark.input_decks.common.trough import sites_within
 from dembark.input_decks.common.trough import trough as trough_mesh
-from dembark.input_decks.common.vibratory_trough import Trough, read
+from dembark.input_decks.common.vibratory_trough import Trough, joined, read
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.input_decks.tests.synthetic_bed import trough
+from dembark.input_decks.vibro_finishing.free_body import FreeBody, free_body
 from dembark.postproc.replica import Replica
+from dembark.postproc.tests.packings import frame_of
 from dembark.postproc.walls.mesh import cut, read_stl
 from dembark.validation.case.deck import prepare, stl
 from dembark.validation.case.folders import find, load
@@ -44,6 +46,15 @@ def measured(run: Trough, booked: float = 1.0, **parameters: Any) -> dict[str, A
     return judged("vibro_finishing", finishing.measure([replica]))
 
 
+def measured_body(folder: Path, weight: float = 1.0, noise: float = 0.0) -> dict[str, Any]:
+    """A bed whose last three grains are taken for the spheres of a body; `weight` times that of the bed, with `noise` of each grain."""
+    run = trough(folder, noise=noise)
+    replica = Replica(folder, {"parameters": defaults("vibro_finishing", motion_frequency=12.5, part="cylinder"),
+                               "derived": {"body_spheres": 3}})
+    replica.__dict__["_read"] = {read.__wrapped__: replace(run, weight=weight * run.weight)}
+    return judged("vibro_finishing", finishing.measure([replica]))
+
+
 def sense_study(back: float = -0.01, none: float = 0.0, fore: float = 0.01) -> dict[str, Any]:
     return judged("vibro_finishing", finishing.study("sense", points("drive_sense", (-1, back), (0, none), (1, fore)), "drive_sense"))
 
@@ -59,7 +70,7 @@ def points(along: str, *pairs: tuple[float, float]) -> list[dict[str, Any]]:
 
 def test_a_bed_that_turns_as_a_body(tmp_path: Path) -> None:
     found = measured(trough(tmp_path, noise=5e-5), **GRAIN)
-    assert names(found, "pass") == {"energy_balance", "likeness"}
+    assert names(found, "pass") == {"energy_balance", "momentum_balance", "likeness"}
     omega = 2.0 * np.pi * 12.5
     assert found["circulation"]["value"] == pytest.approx(0.5 / omega, rel=0.05)
     assert found["revolution"]["value"] == pytest.approx(0.5 / omega, rel=0.1)
@@ -82,6 +93,76 @@ def test_the_trough_shakes_bed_and_part_in_their_plane(engine: str, simulate: An
     assert all((frame.positions[:, 1] == 0.0).all() and np.hypot(*frame.positions[:, [0, 2]].T).max() < 0.05 for frame in frames)
     assert frames[0].radii[-1] == pytest.approx(0.01) and len(frames[0].ids) == 61
     assert 0.001 < found["power"]["value"] < 1.5 and found["noise"]["value"] > 0.0
+
+
+def test_momentum_balances_and_a_body_stays_rigid(tmp_path: Path) -> None:
+    found = measured_body(tmp_path)
+    assert names(found, "pass") == {"momentum_balance", "rigidity"} and "energy_balance" not in found
+
+
+def part(**changes: Any) -> FreeBody:
+    return free_body(SimpleNamespace(**defaults("vibro_finishing", part_density=2500.0, **changes)))
+
+
+@pytest.mark.parametrize("spacing", [0.0025, 0.004])
+def test_the_cylinder_has_its_own_mass_and_moment(spacing: float) -> None:
+    """Those of a prism with 48 corners, 0.29 % less than the cylinder, whatever the spheres."""
+    body = part(part="cylinder", part_sphere=spacing)
+    assert body.mass == pytest.approx(2500.0 * np.pi * 0.02**2 * 0.005, rel=0.003)
+    assert body.moment == pytest.approx(0.5 * body.mass * 0.02**2, rel=0.003)
+    assert len(body.places) * spacing**2 == pytest.approx(np.pi * 0.02**2, rel=0.05)
+    assert 0.0195 < body.reach < 0.02 + 0.5 * spacing
+
+
+def test_the_section_is_that_of_the_file_about_its_centre_of_mass() -> None:
+    """An angle of 30 mm by 20 mm, 6 mm thick: two rectangles with known moments."""
+    body = part(part="file")
+    areas, centres = np.array([180.0, 84.0]), np.array([[15.0, 3.0], [3.0, 13.0]])
+    middle = areas @ centres / areas.sum()
+    second = (areas * (np.array([30.0**2 + 6.0**2, 6.0**2 + 14.0**2]) / 12.0 + ((centres - middle) ** 2).sum(axis=1))).sum()
+    assert body.mass == pytest.approx(2500.0 * 264e-6 * 0.005, rel=1e-6)
+    assert body.moment == pytest.approx(2500.0 * 0.005 * second * 1e-12, rel=1e-6)
+    x, z = 1e3 * body.places.T + middle[:, None]
+    assert ((x > 0.0) & (z > 0.0) & (x < 30.0) & (z < 20.0) & ((x < 6.0) | (z < 6.0))).all()
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, -2.9])
+def test_spheres_of_a_body_are_one_part(turn: float) -> None:
+    """Its centre of mass, velocity and spin, however it has turned."""
+    rest, centre, velocity, spin = part(part="file").places, np.array([0.01, -0.03]), np.array([0.2, -0.1]), 12.0
+    arm = np.column_stack([rest[:, 0] * np.cos(turn) + rest[:, 1] * np.sin(turn), rest[:, 1] * np.cos(turn) - rest[:, 0] * np.sin(turn)])
+    speed = velocity + spin * np.column_stack([arm[:, 1], -arm[:, 0]])
+
+    def rows(plane: Any) -> Any:
+        return np.insert(np.vstack([[[0.1, 0.1]], plane]), 1, 0.0, axis=1)
+
+    frame = frame_of(rows(centre + arm), 0.001, {}, step=0, velocities=rows(speed))
+    numbers = {"body_spheres": len(rest), "body_mass": 0.7} | {
+        f"{which}_{axis}": value for which, row in (("first", 0), ("last", -1)) for axis, value in zip("xz", rest[row], strict=True)}
+    found = joined(frame, numbers)
+    assert len(found.ids) == 2 and found.masses[-1] == 0.7 and (found.positions[0] == frame.positions[0]).all()
+    np.testing.assert_allclose(found.positions[-1], [centre[0], 0.0, centre[1]], atol=1e-12)
+    np.testing.assert_allclose(found.velocities[-1], [velocity[0], 0.0, velocity[1]], atol=1e-12)
+    assert found.omegas[-1] == pytest.approx([0.0, spin, 0.0])
+
+
+@pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
+@pytest.mark.parametrize("part", ["cylinder", "file"])
+def test_the_part_is_a_body_of_spheres(part: str, engine: str, simulate: Any) -> None:
+    run = simulate("vibro_finishing", engine, {**SMALL, "trough_width": 0.1, "part": part, "part_density": 2500.0})
+    found = judged("vibro_finishing", finishing.measure([run]))
+    assert {"momentum_balance", "rigidity"} <= names(found, "pass") and "energy_balance" not in found, found
+    places = np.array([frame.positions for frame in run.grains()])
+    assert places.shape[1] == 60 + run.derived["body_spheres"]
+    assert np.abs(places[..., 1]).max() < 1e-11 and np.hypot(places[..., 0], places[..., 2]).max() < 0.06
+    assert np.abs(read(run).run.frames[0].omegas[-1, 1]) > 0.0
+
+
+@pytest.mark.parametrize(("changes", "line"), [({"part": "cylinder", "part_sphere": 0.05}, "lower part_sphere"),
+                                               ({"part": "file", "trough_width": 0.02}, "write the file in m")])
+def test_a_body_that_is_none_is_refused(changes: dict[str, Any], line: str) -> None:
+    with pytest.raises(DembarkError, match=line):
+        part(**changes)
 
 
 @pytest.mark.parametrize("trough", ["round", "file"])
@@ -179,6 +260,8 @@ def controls_vibro_finishing(folder: Path) -> Iterator[Control]:
     run = trough(folder, noise=5e-5)
     right = measured(run, **GRAIN)
     yield Control("a hundredth of the damping that is not booked", right, measured(run, 0.99, **GRAIN))
+    yield Control("a body whose weight is counted for each of two spheres", measured_body(folder), measured_body(folder, weight=1.1))
+    yield Control("a sphere that leaves its body", measured_body(folder), measured_body(folder, noise=5e-5))
     yield Control("a part that is held", right, measured(trough(folder, noise=5e-5, still=True), **GRAIN))
     yield Control("a bed that turns the same way whatever the drive", sense_study(), sense_study(0.01, 0.01, 0.01))
     yield Control("a bed that turns faster with every halving of the step",

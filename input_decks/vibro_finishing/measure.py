@@ -8,7 +8,7 @@ import numpy as np
 from dembark.input_decks.common.estimates import divided, over_chaotic, ratio
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
 from dembark.input_decks.common.power_law import ordered
-from dembark.input_decks.common.vibratory_trough import Trough, drifts, numerical_changes, read, spectra
+from dembark.input_decks.common.vibratory_trough import Trough, drifts, numerical_changes, read, rigidity, spectra
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, over_replicas
 from dembark.postproc.studies import measured
 
@@ -25,13 +25,18 @@ def measure(replicas: Replicas) -> Measurement:
         return Value(over_chaotic(number(one) for one in runs))
 
     values = {
-        "energy_balance": Value(exact(np.max([imbalance(one.rows, CONTACT_PARTS) for one in runs])), exact(0.0)),
+        "momentum_balance": Value(exact(max(one.momentum_gap("trough") for one in runs)), exact(0.0)),
         "circulation": over(Trough.turning, drive), "spin": over(Trough.spin, drive), "revolution": over(Trough.revolution, drive),
         "part_height": over(Trough.height, diameter), "power": over(lambda one: one.power("trough")),
         "noise": once(lambda one: one.noise("trough")), "stirring": over(Trough.fluctuation_ratio),
         "agitation": over(Trough.agitation),
     }
-    if p["part_diameter"] == diameter and p["part_density"] == p["grain_density"]:
+    if p["part"] == "sphere":
+        values["energy_balance"] = Value(exact(np.max([imbalance(one.rows, CONTACT_PARTS) for one in runs])), exact(0.0))
+    else:
+        changes = [rigidity(list(one.grains()), int(one.derived["body_spheres"])) for one in replicas]
+        values["rigidity"] = Value(exact(max(changes) / diameter), exact(0.0))
+    if p["part"] == "sphere" and p["part_diameter"] == diameter and p["part_density"] == p["grain_density"]:
         worst = max((one.likeness() for one in runs), key=abs)
         values["likeness"] = Value(exact(worst), exact(0.0))
     return Measurement(values, [drifts(runs), spectra(runs, "trough")])

@@ -1,20 +1,46 @@
-"""Vibratory finishing: grains and a free part in a trough that moves on a circle; the energies of all forces are booked."""
+"""Vibratory finishing: grains and a free part in a trough that moves on a circle; with a sphere as part all energies are booked."""
 
 import math
 
-from yade import dembark
+from yade import dembark, utils
 
 p = dembark.parameters()
 weight = (0, 0, -p.gravity)
 materials, ids = dembark.begin(p, weight)
-dembark.block(ids[1])
-# The last body is the part, whose density is not that of the grains' material.
-part = O.bodies[ids[1][-1]]
-part.state.mass = 4.0 / 3.0 * math.pi * part.shape.radius**3 * p.part_density
-part.state.inertia = Vector3(1, 1, 1) * (p.part_inertia * part.state.mass * part.shape.radius**2)
+
+
+def free_body():
+    """The part as a clump of spheres, with the mass and, about each axis, the moment of inertia that it has about y."""
+    x, z, radius = p.body_places[::2], p.body_places[1::2], 0.5 * p.part_sphere
+    spheres = [utils.sphere((p.body_x + a, 0, p.body_z + b), radius, material=materials[0]) for a, b in zip(x, z, strict=True)]
+    # YADE sums up mass and inertia of members: those of one without a volume, while spheres have no density. It is taken out at once.
+    core = utils.box((p.body_x, 0, p.body_z), (1e-9, 1e-9, 1e-9), material=materials[0])
+    core.state.mass, core.state.inertia = p.body_mass, Vector3(1, 1, 1) * p.body_moment
+    shared = O.materials[materials[0]]
+    shared.density = 0
+    number, members = O.bodies.appendClumped([core, *spheres])
+    shared.density = p.grain_density
+    O.bodies.erase(members[0])
+    for sphere in spheres:
+        sphere.state.mass = p.body_mass / len(spheres)
+        sphere.state.inertia = Vector3(1, 1, 1) * (0.4 * sphere.state.mass * radius**2)
+    O.bodies[number].state.vel = -0.5 * O.dt * Vector3(*weight)
+    return number
+
+
+if p.part == "sphere":
+    # The last body is the part, whose density is not that of the grains' material.
+    part = O.bodies[ids[1][-1]]
+    part.state.mass = 4.0 / 3.0 * math.pi * part.shape.radius**3 * p.part_density
+    part.state.inertia = Vector3(1, 1, 1) * (p.part_inertia * part.state.mass * part.shape.radius**2)
+    dembark.block(ids[1])
+else:
+    dembark.block([*ids[1], free_body()])
 walls = {"trough": dembark.mesh("trough.stl", materials[1])}
 moving = dembark.motion(p, walls, ["trough"])
-history = dembark.machine_history(ids[1], weight, moving)
-record = dembark.Recorder(p, walls, boundary="ff ff ff", gravity=weight, history=history, report=p.stride)
-O.engines = dembark.mesh_loop(p, materials, weight, account=EnergyAccount(), moving=moving)
+# The account refuses clumps.
+history = dembark.machine_history(ids[1], weight, moving) if p.part == "sphere" else None
+account = EnergyAccount() if p.part == "sphere" else None
+record = dembark.Recorder(p, walls, boundary="ff ff ff", gravity=weight, history=history, report=p.stride, moving=moving)
+O.engines = dembark.mesh_loop(p, materials, weight, account=account, moving=moving)
 dembark.run(p.steps)
