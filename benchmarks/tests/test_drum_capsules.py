@@ -52,10 +52,10 @@ def test_intervals_are_those_of_quarters_of_a_revolution() -> None:
 def test_the_drum_in_yade_is_that_of_python(*, in_space: bool) -> None:
     """Until logs have met logs and the shell."""
     try:
-        cost, place = drum.in_yade(100, 1500, in_space=in_space)
+        cost, place = drum.in_yade(150, 1500, in_space=in_space)
     except DembarkError as error:
         pytest.skip(str(error))
-    motion = (drum.space(100, None) if in_space else drum.section(100)[0]).run(1500 * drum.STEP, drum.STEP, every=1500)
+    motion = (drum.space(150, None) if in_space else drum.section(150)[0]).run(1500 * drum.STEP, drum.STEP, every=1500)
     assert motion.report["impacts_begun"][-1] > 20
     assert place[:, : motion.position.shape[2]] == pytest.approx(motion.position[-1], abs=1e-8)
     assert cost > 0.0
