@@ -11,8 +11,8 @@ drum: its radius of 1.3 m, and the length at which the logs fill 0.3 of it.
 - `inclined`: the drum repeats after its length (a period), and gravity is tilted by the slope; the logs move along it for ever. The mean
   speed along the axis gives the time that a log takes through a drum of a given length. A drum with a feed and a gate has ends; this has
   none, so what holds back logs at a gate is not in the numbers.
-- `engine`: the first second of `closed` and `section` in LIGGGHTS and in Python: largest distance of a log between both after half
-  a second, and the cost of a step, medians of three rounds in which the four take turns.
+- `engine`: the first second of `closed` and `section` in LIGGGHTS, YADE and Python: largest distance of a log from its place in Python
+  after half a second, and the cost of a step, medians of three rounds in which all take turns.
 - `crib`: one step of a stack of crossed layers on a floor, with a contact of every log with every one of the layers above and below.
 
 Means have 95 % intervals over quarters of a revolution, after the first revolution. Cost is the processor time of a step.
@@ -38,6 +38,7 @@ from dembark.postproc import GrainsDump
 from dembark.postproc.debarking import ForceRange, Load, Logs, outcome
 from dembark.postproc.impacts import RECORD
 from dembark.postproc.statistics import student
+from dembark.validation import engines
 
 Array = NDArray[np.float64]
 TOTAL, THIN, THICK = 1.2, 0.10, 0.24  # m
@@ -135,39 +136,66 @@ def deck(count: int, steps: int, *, in_space: bool) -> tuple[str, str]:
     return "\n".join(lines) + "\n", "".join(f"{n} {float(own)!r} 0 0 1\n" for n, own in enumerate(length, 1))
 
 
-def in_engine(count: int, seconds: float = 1.0, rounds: int = 3) -> dict[str, Any]:
-    """LIGGGHTS and Python: distance of the logs (m) after half a second, cost of a step (ms) with its range, and the certificate."""
-    steps = round(seconds / STEP)
-    found: dict[str, Any] = {}
-    spent: dict[tuple[str, str], list[float]] = {}
+def in_liggghts(count: int, steps: int, *, in_space: bool) -> tuple[float, Array]:
+    """Cost of a step (ms) without the start of the engine, and the places (m) of the logs at the end."""
     with tempfile.TemporaryDirectory(prefix="dembark-logs-") as name:
-        folder = Path(name)
-
-        def engine(model: str, steps: int) -> float:
-            script, listed = deck(count, steps, in_space=model == "closed")
+        folder, spent = Path(name), []
+        for length in (0, steps):
+            script, listed = deck(count, length, in_space=in_space)
             (folder / "logs.txt").write_text(listed)
             cost, failed = spent_by(script, folder)
             if failed:
                 raise RuntimeError(failed)
-            return cost
+            spent.append(cost)
+        return 1e3 * (spent[1] - spent[0]) / steps, GrainsDump(folder / "logs.dump")[-1].positions
 
+
+def in_yade(count: int, steps: int, *, in_space: bool) -> tuple[float, Array]:
+    """As in LIGGGHTS."""
+    r, length, mass = logs(count)
+    spot, radius, speed, long = layout(count, in_space=in_space)
+    words = [{"position": place, "radius": own, "mass": weight, **({"length": more} if in_space else {})}
+             for place, own, weight, more in zip(spot.tolist(), r.tolist(), mass.tolist(), length.tolist(), strict=True)]
+    drum = {"logs": words, "radius": radius, "omega": speed, "length": long, "step": STEP, "shell": SHELL, "gravity": GRAVITY,
+            "impact": {"stiffness": STIFFNESS, "theta": THETA, "contactDamping": DAMPING, "friction": FRICTION}}
+    engine = engines.find("yade")
+    with tempfile.TemporaryDirectory(prefix="dembark-logs-") as name:
+        (Path(name) / "drum.json").write_text(json.dumps(drum))
+        words_of_run = engine.command(Path(__file__).parent / "yade_drum.py", {"drum": "drum.json", "steps": steps})
+        done = engines.call(words_of_run, Path(name), engine.environment())
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    if done.returncode or not lines:
+        raise RuntimeError(((done.stderr or done.stdout).strip().splitlines() or ["no word"])[-1])
+    found = json.loads(lines[-1])
+    return found["ms_per_step"], np.array(found["places"])
+
+
+def in_engines(count: int, seconds: float = 1.0, rounds: int = 3) -> dict[str, Any]:
+    """Distance of the logs from their places in Python (m) after half a second, cost of a step (ms) with its range, certificate."""
+    steps, short = round(seconds / STEP), round(0.5 / STEP)
+    programs = {"LIGGGHTS": in_liggghts, "YADE": in_yade}
+    found: dict[str, Any] = {}
+    spent: dict[tuple[str, str], list[float]] = {}
+
+    def python(model: str) -> CapsuleSystem | ImpactSystem:
+        return space(count, None) if model == "closed" else section(count)[0]
+
+    for model in ("closed", "section"):
+        place = python(model).run(short * STEP, STEP, every=short).position[-1]
+        apart = {name: program(count, short, in_space=model == "closed")[1][:, : place.shape[1]] - place
+                 for name, program in programs.items()}
+        found[model] = {"apart": {name: float(np.abs(way).max()) for name, way in apart.items()}}
+    for _ in range(rounds):
         for model in ("closed", "section"):
-            short = round(0.5 / STEP)
-            engine(model, short)
-            system = space(count, None) if model == "closed" else section(count)[0]
-            place = system.run(short * STEP, STEP, every=short).position[-1]
-            apart = GrainsDump(folder / "logs.dump")[-1].positions[:, : place.shape[1]] - place
-            found[model] = {"apart": float(np.abs(apart).max())}
-        for _ in range(rounds):
-            for model in ("closed", "section"):
-                spent.setdefault((model, "LIGGGHTS"), []).append(1e3 * (engine(model, steps) - engine(model, 0)) / steps)
-                system = space(count, None) if model == "closed" else section(count)[0]
-                begin = time.process_time()
-                motion = system.run(steps * STEP, STEP, every=steps)
-                spent.setdefault((model, "Python"), []).append(1e3 * (time.process_time() - begin) / steps)
-                found[model]["certificate"] = float(motion.report["worst_certificate"][-1])
-    for (model, program), values in spent.items():
-        found[model][program] = {"ms_per_step": float(np.median(values)), "range": [min(values), max(values)]}
+            for name, program in programs.items():
+                spent.setdefault((model, name), []).append(program(count, steps, in_space=model == "closed")[0])
+            system = python(model)
+            begin = time.process_time()
+            motion = system.run(steps * STEP, STEP, every=steps)
+            spent.setdefault((model, "Python"), []).append(1e3 * (time.process_time() - begin) / steps)
+            found[model]["certificate"] = float(motion.report["worst_certificate"][-1])
+    for (model, name), values in spent.items():
+        found[model][name] = {"ms_per_step": float(np.median(values)), "range": [min(values), max(values)]}
     return found
 
 
@@ -239,7 +267,7 @@ def main() -> None:
         found["crib"] = crib()
         print("crib", found["crib"], flush=True)
     if options.only in (None, "engine"):
-        found["engine"] = in_engine(options.logs)
+        found["engine"] = in_engines(options.logs)
         print("engine", found["engine"], flush=True)
     if options.only in (None, "section"):
         discs, speed = section(options.logs)

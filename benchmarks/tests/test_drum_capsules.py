@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import drum_capsules as drum
+from dembark.common.errors import DembarkError
 
 
 def test_logs_fill_the_drum_as_said() -> None:
@@ -59,3 +60,16 @@ def test_intervals_are_those_of_quarters_of_a_revolution() -> None:
     mean, half = drum.interval(np.repeat([1.0, 3.0], drum.SAMPLES // 2))
     assert mean == pytest.approx(2.0)
     assert half == pytest.approx(3.182 * math.sqrt(4 / 3) / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize("in_space", [True, False])
+def test_the_drum_in_yade_is_that_of_python(*, in_space: bool) -> None:
+    """Until logs have met logs and the shell."""
+    try:
+        cost, place = drum.in_yade(150, 1500, in_space=in_space)
+    except DembarkError as error:
+        pytest.skip(str(error))
+    motion = (drum.space(150, None) if in_space else drum.section(150)[0]).run(1500 * drum.STEP, drum.STEP, every=1500)
+    assert motion.report["impacts_begun"][-1] > 20
+    assert place[:, : motion.position.shape[2]] == pytest.approx(motion.position[-1], abs=1e-8)
+    assert cost > 0.0

@@ -10,6 +10,7 @@
 #include <pkg/common/Sphere.hpp>
 #include <pkg/common/Wall.hpp>
 
+#include "Capsule.hpp"
 #include "ContactView.hpp"
 #include "CylinderWall.hpp"
 #include "SavedNumbers.hpp"
@@ -43,6 +44,14 @@ int blockedAxis(const State& state, Body::id_t id) {
 	fail(logName(id) + "has blockedDOFs '" + state.blockedDOFs_vec_get() +
 	     "'; it must be free (''), held ('xyzXYZ'), or move in a plane, e.g. 'zXY': one translation, and not the rotation about that "
 	     "axis");
+}
+
+/// As blockedAxis(), of a capsule, which NewtonIntegrator must not turn.
+int freeCapsule(const State& state, Body::id_t id) {
+	if (state.blockedDOFs != State::DOF_RXRYRZ)
+		fail(logName(id) + "is a Capsule and has blockedDOFs '" + state.blockedDOFs_vec_get() +
+		     "'; it must be 'XYZ' (LcpImpact turns it) or 'xyzXYZ' (held)");
+	return -1;
 }
 
 double inertia(const State& state, int axis, Body::id_t id) {
@@ -87,31 +96,50 @@ impact::Body LcpImpact::logOf(const Body& body) {
 	const Body::id_t id    = body.getId();
 	if (body.isClump() || body.isClumpMember())
 		fail(logName(id) + "belongs to a clump; LcpImpact knows single spheres only, leave it out by LcpImpact.mask or ids");
-	impact::Body log{id,
-	                 INFINITY,
-	                 INFINITY,
-	                 static_cast<const Sphere&>(*body.shape).radius,
-	                 body.material ? body.material->id : -1,
-	                 vec(state.pos),
-	                 vec(state.vel),
-	                 vec(state.angVel)};
-	if (!body.isDynamic()) return log;
-	if (body.isAspherical()) fail(logName(id) + "is aspherical; set Body.aspherical to False");
-	const int axis = lcp_impact::blockedAxis(state, id);
-	if (plane != lcp_impact::unknown && axis != plane)
-		fail(logName(id) + "has blockedDOFs '" + state.blockedDOFs_vec_get() +
-		     "', others move in another plane or freely; all logs must be blocked alike");
-	plane = axis;
-	if (!(state.mass > 0.0)) fail(logName(id) + "has a mass of " + text(state.mass) + " kg; it must be > 0");
-	log.mass    = state.mass;
-	log.inertia = lcp_impact::inertia(state, axis, id);
+	impact::Body      log{id,
+	                      INFINITY,
+	                      INFINITY,
+	                      static_cast<const Sphere&>(*body.shape).radius,
+	                      body.material ? body.material->id : -1,
+	                      vec(state.pos),
+	                      vec(state.vel),
+	                      vec(state.angVel)};
+	const auto* const capsule = dynamic_cast<const Capsule*>(body.shape.get());
+	if (body.isDynamic()) {
+		if (body.isAspherical() && !capsule) fail(logName(id) + "is aspherical; set Body.aspherical to False");
+		const int axis = capsule ? lcp_impact::freeCapsule(state, id) : lcp_impact::blockedAxis(state, id);
+		if (plane != lcp_impact::unknown && axis != plane)
+			fail(logName(id) + "has blockedDOFs '" + state.blockedDOFs_vec_get() +
+			     "', others move in another plane or freely; all logs must be blocked alike");
+		plane = axis;
+		if (!(state.mass > 0.0)) fail(logName(id) + "has a mass of " + text(state.mass) + " kg; it must be > 0");
+		log.mass = state.mass;
+		if (!capsule) log.inertia = lcp_impact::inertia(state, axis, id);
+	}
+	if (capsule) layCapsule(state, capsule->length, log);
 	return log;
+}
+
+/// The attitude of a capsule, which is to be the next of `logs`. Its angular momentum is that of the last step or, where its spin is not,
+/// that of the spin.
+void LcpImpact::layCapsule(const State& state, Real length, impact::Body& log) {
+	const Quaternionr& q = state.ori;
+	impact::Attitude   attitude{length, {q.w(), q.x(), q.y(), q.z()}, vec(state.angMom)};
+	attitude.shape(log);
+	if (std::isinf(log.mass)) return;
+	const auto last =
+		std::lower_bound(turned.begin(), turned.end(), log.id, [](const Turned& one, std::int64_t id) { return one.id < id; });
+	if (last == turned.end() || last->id != log.id || vec(last->spin) != state.angVel) attitude.begin(log);
+	else if (scene->iter == lastIteration) attitude.momentum = last->momentum;
+	attitude.spin(log);
+	capsules.push_back({logs.size(), attitude});
 }
 
 /// Fills `logs` and `materials`.
 void LcpImpact::gatherLogs(const Vector3r& gravity) {
 	scene->forces.sync();
 	logs.clear();
+	capsules.clear();
 	materials.clear();
 	plane           = lcp_impact::unknown;
 	const auto take = [&](const Body& body) {
@@ -122,8 +150,9 @@ void LcpImpact::gatherLogs(const Vector3r& gravity) {
 		Vector3r force  = scene->forces.getForce(body.getId()) + body.state->mass * gravity;
 		Vector3r torque = scene->forces.getTorque(body.getId());
 		if (plane >= 0) force[plane] = 0.0;
+		const bool turns = !capsules.empty() && capsules.back().log + 1 == logs.size();
 		for (int i = 0; i < 3; ++i)
-			if (body.state->blockedDOFs & State::axisDOF(i, true)) torque[i] = 0.0;
+			if (!turns && (body.state->blockedDOFs & State::axisDOF(i, true))) torque[i] = 0.0;
 		log.force  = vec(force);
 		log.torque = vec(torque);
 	};
@@ -152,14 +181,22 @@ void LcpImpact::addShape(const Body& body, const impact::Wall& wall, std::vector
 	const State&      state = *body.state;
 	const std::string where = wallName(impact::wall_number(wall.id)), id = std::to_string(body.getId());
 	if (body.isDynamic()) fail(where + ": body " + id + " can move freely; hold it by blockedDOFs = 'xyzXYZ'");
+	// So that its surface moves along itself.
+	const auto about = [&](const Vector3r& axis, const char* what) {
+		const double omega = state.angVel.dot(axis);
+		if ((state.angVel - omega * axis).norm() > 1e-9 * state.angVel.norm())
+			fail(where + ": body " + id + " turns about another axis than its own; make angVel parallel to " + what);
+		return omega;
+	};
 	if (const auto* flat = dynamic_cast<const Wall*>(body.shape.get())) {
 		const Vector3r normal = Vector3r::Unit(flat->axis) * (flat->sense < 0 ? -1.0 : 1.0);
-		around.planes.push_back({wall, vec(state.pos), vec(normal), vec(state.vel), 0.0, flat->sense == 0});
+		const double   omega  = about(normal, "its normal");
+		if (plane >= 0 && omega != 0.0)
+			fail(where + ": body " + id + " turns, and carries logs out of the plane they move in; set its angVel to 0");
+		around.planes.push_back({wall, vec(state.pos), vec(normal), vec(state.vel), omega, flat->sense == 0});
 	} else if (const auto* round = dynamic_cast<const CylinderWall*>(body.shape.get())) {
-		const double omega = state.angVel.dot(round->axis);  // its surface moves along itself
+		const double omega = about(round->axis, "CylinderWall.axis");
 		if (!(round->radius > 0.0)) fail(where + ": CylinderWall.radius of body " + id + " is not set; give it in m");
-		if ((state.angVel - omega * round->axis).norm() > 1e-9 * state.angVel.norm())
-			fail(where + ": body " + id + " turns about another axis than its own; make angVel parallel to CylinderWall.axis");
 		around.drums.push_back({wall, vec(state.pos), vec(round->axis), round->radius, omega, vec(state.vel)});
 	} else if (const auto* facet = dynamic_cast<const Facet*>(body.shape.get())) {
 		::dembark::Triangle triangle;
@@ -196,6 +233,10 @@ void LcpImpact::gatherWalls() {
 			addShape(body, common, mesh);
 		}
 		if (mesh.empty()) continue;
+		const auto capsule = std::find_if(logs.begin(), logs.end(), impact::has_length);
+		if (capsule != logs.end())
+			fail(wallName(w) + ": a Facet is for logs without a length, and log " + std::to_string(capsule->id) +
+			     " has one; use Wall and CylinderWall");
 		if (around.meshes.size() == meshes) around.meshes.emplace_back();
 		static_cast<impact::Wall&>(around.meshes[meshes]) = common;
 		around.meshes[meshes++].update(std::move(mesh));
@@ -235,13 +276,10 @@ void LcpImpact::prepare() {
 		const std::string doubtful = impact::step_warning(now, logs, around);
 		if (!doubtful.empty()) dembark_yade::warn("LcpImpact: " + doubtful);
 	}
-	const bool                begins = !system;
-	const std::vector<double> state  = system ? system->state() : std::vector<double>();
-	system                           = std::make_unique<impact::System>(now);
-	if (!begins) return system->restore(state);
-	if (savedState.empty()) return;
-	::dembark::Archive saved(dembark_yade::decode(savedState));
-	archive(saved);
+	const std::vector<double> state = system ? system->state() : loaded;
+	auto                      fresh = std::make_unique<impact::System>(now);
+	if (!state.empty()) fresh->restore(state);
+	system = std::move(fresh);
 }
 
 void LcpImpact::action() {
@@ -249,6 +287,10 @@ void LcpImpact::action() {
 	if (stiffnessRows.empty()) fail("LcpImpact.stiffness is not set; give the stiffness of the logs' boundaries in N/m");
 	const bool first = steps == 0 && velocityAtStart;
 	try {
+		if (!system && loaded.empty() && !savedState.empty()) {
+			::dembark::Archive saved(dembark_yade::decode(savedState));
+			archive(saved);
+		}
 		gatherLogs(integrator().gravity);
 		gatherWalls();
 		prepare();
@@ -261,13 +303,14 @@ void LcpImpact::action() {
 		if (std::string(error.what()).rfind("dembark: ", 0) == 0) throw;
 		fail(std::string("LcpImpact, step ") + std::to_string(scene->iter) + ": " + error.what());
 	}
+	writeImpacts();
 	if (first) moveBack();
+	turnCapsules(first ? 0.5 : 1.0);
 	for (std::size_t i = 0; i < logs.size(); ++i) {
 		scene->forces.addForce(static_cast<Body::id_t>(logs[i].id), vec(system->wrenches()[i].force));
 		scene->forces.addTorque(static_cast<Body::id_t>(logs[i].id), vec(system->wrenches()[i].torque));
 	}
 	pushWalls();
-	writeImpacts();
 	if (scene->iter != lastIteration) ++steps;
 	lastIteration = scene->iter;
 }
@@ -283,6 +326,24 @@ void LcpImpact::moveBack() const {
 			if (!(state.blockedDOFs & State::axisDOF(k))) state.vel[k] -= 0.5 * scene->dt * f[k] / state.mass;
 			if (!(state.blockedDOFs & State::axisDOF(k, true))) state.angVel[k] -= 0.5 * scene->dt * t[k] / state.inertia[k];
 		}
+	}
+}
+
+/// The capsules turn freely until the next step, with the spin that leads NewtonIntegrator there.
+void LcpImpact::turnCapsules(double kick) {
+	turned.clear();
+	for (auto& [i, attitude] : capsules) {
+		const impact::Body&     log    = logs[i];
+		const shared_ptr<Body>& body   = Body::byId(static_cast<Body::id_t>(log.id), scene);
+		const auto              gain   = scene->dt * (log.torque + system->wrenches()[i].torque);
+		const auto              before = attitude.momentum - (1.0 - kick) * gain;
+		attitude.momentum += kick * gain;
+		State& state  = *body->state;
+		state.angMom  = vec(attitude.momentum);
+		state.angVel  = vec(attitude.mean_spin(log, scene->dt));
+		state.inertia = Vector3r(log.inertia, log.inertia, log.axial_inertia);
+		body->setAspherical(true);
+		turned.push_back({log.id, before, vec(state.angVel)});
 	}
 }
 
@@ -303,11 +364,11 @@ void LcpImpact::pushWalls() {
 
 /// What saved scenes keep: the state of the model, and where its file of impacts ends.
 void LcpImpact::archive(::dembark::Archive& a) {
-	::dembark::FormatVersion format{3.0};
-	std::vector<double>      state = system->state();
-	a.all(std::tie(format, state, file));
+	::dembark::FormatVersion format{4.0};
+	std::vector<double>      state = a.reading() ? std::vector<double>() : system->state();
+	a.all(std::tie(format, state, file, turned));
 	a.end();
-	if (a.reading()) system->restore(state);
+	if (a.reading()) loaded = std::move(state);
 }
 
 void LcpImpact::preSave(LcpImpact&) {

@@ -9,6 +9,7 @@
 
 #include "SavedFormat.hpp"
 #include "attributes.hpp"
+#include "dembark/impact/attitude.hpp"
 #include "dembark/impact/impact_file.hpp"
 #include "dembark/impact/system.hpp"
 #include "dembark/impact/geometry.hpp"
@@ -59,7 +60,7 @@ public:
 	Vector3r              wallForce(const std::string& name) const;
 
 	// clang-format off
-	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(LcpImpact,GlobalEngine,"Impacts of logs, spheres that mostly move in a plane: the contact forces of each step are the solution of a linear complementarity problem found by the energy criterion, with Finnie-Rabinowicz friction. To be placed after all engines that add forces and right before :yref:`NewtonIntegrator`, whose gravity it takes into account and whose damping must be 0. It finds its contacts itself: no collider, no :yref:`InteractionLoop`.",
+	YADE_CLASS_BASE_DOC_ATTRS_CTOR_PY(LcpImpact,GlobalEngine,"Impacts of logs, spheres that mostly move in a plane, or :yref:`Capsule` in space: the contact forces of each step are the solution of a linear complementarity problem found by the energy criterion, with Finnie-Rabinowicz friction. To be placed after all engines that add forces and right before :yref:`NewtonIntegrator`, whose gravity it takes into account and whose damping must be 0. It finds its contacts itself: no collider, no :yref:`InteractionLoop`.",
 		((Real,contactDamping,0,Attr::triggerPostLoad,"Damping [N s/m] of the deformation in each contact, >= 0"))
 		((Real,theta,1,Attr::triggerPostLoad,"Weight of the end of the step in the law of contact, 0.5...1: 1 = the published scheme, 0.5 = without its numerical loss"))
 		((Real,tangentialRatio,2./7.,Attr::triggerPostLoad,"Tangential stiffness of a contact in units of its normal stiffness, > 0"))
@@ -106,6 +107,7 @@ private:
 	const NewtonIntegrator&     integrator() const;
 	void                        gatherLogs(const Vector3r& gravity);
 	::dembark::impact::Body     logOf(const Body&);
+	void                        layCapsule(const State&, Real length, ::dembark::impact::Body&);
 	void                        gatherWalls();
 	void                        addShape(const Body&, const ::dembark::impact::Wall&, std::vector<::dembark::Triangle>&);
 	void                        findContacts(double reach, std::vector<::dembark::impact::Contact>&);
@@ -114,17 +116,34 @@ private:
 	void                        checkStart();
 	void                        prepare();
 	void                        moveBack() const;
+	void                        turnCapsules(double kick);
 	void                        pushWalls();
 	void                        writeImpacts();
 	void                        archive(::dembark::Archive&);
 	std::string                 wallName(std::size_t number) const;
 
+	/// Of a capsule after a step.
+	struct Turned {
+		std::int64_t            id = 0;
+		::dembark::Vec3<double> momentum{};  ///< kg m^2/s, of rotation before the step, which may have to be done again
+		::dembark::Vec3<double> spin{};      ///< rad/s, that it was given; another one is the user's
+		auto                    fields() { return std::tie(id, momentum, spin); }
+	};
+	/// Of a capsule that moves, in the present step.
+	struct Turning {
+		std::size_t                 log;  ///< index into `logs`
+		::dembark::impact::Attitude attitude;
+	};
+
 	std::unique_ptr<::dembark::impact::System> system;
+	std::vector<double>                        loaded;         ///< its state in a saved scene
 	Real                                       judgedDt = -1;  ///< of the last warning about the time step, or of none
 	::dembark::impact::ContactGeometry         around;
 	::dembark::impact::ImpactFile              file;
+	std::vector<Turned>                        turned;  ///< in the order of their ids
 	// Of the present step:
 	std::vector<::dembark::impact::Body> logs;        // in the order of their ids; held spheres have infinite mass
+	std::vector<Turning>                 capsules;    // those of them that move
 	std::vector<int>                     materials;   // ids of YADE, increasing; the index is that of the model
 	int                                  plane = -1;  // axis of the blocked translation of all logs that move
 };

@@ -31,6 +31,13 @@ struct Attitude {
   Quaternion orientation{};  ///< from the axes of the body, z along its own, to space
   Vec3<double> momentum{};   ///< kg m^2/s, of rotation
 
+  /// Makes the body the solid capsule that lies so.
+  void shape(Body& b) const {
+    const CapsuleInertia own = capsule_inertia(b.mass, b.radius, length);
+    b.inertia = own.across;
+    b.axial_inertia = own.axial;
+    lay(b);
+  }
   /// Lays the body along its axis.
   void lay(Body& b) const { b.half_axis = (0.5 * length) * orientation.turned({0.0, 0.0, 1.0}); }
   /// With the spin that the body has.
@@ -41,12 +48,21 @@ struct Attitude {
       orientation = normalised(rotation_by(dt * b.spin) * orientation);
       return lay(b);
     }
-    orientation = rotated_freely(inertia_of(b), dt, momentum, orientation);
+    orientation = normalised(free_turn(b, dt) * orientation);
     lay(b);
-    b.spin = inertia_of(b).spin(momentum, axis_of(b));
+    spin(b);
   }
+  /// Gives the body the spin that belongs to the angular momentum.
+  void spin(Body& b) const { b.spin = inertia_of(b).spin(momentum, axis_of(b)); }
+  /// The spin (rad/s) with which an engine turns the body in dt (s) as turn() does.
+  Vec3<double> mean_spin(const Body& b, double dt) const { return turn_of(free_turn(b, dt)) * (1.0 / dt); }
 
   auto fields() { return std::tie(length, orientation, momentum); }
+
+ private:
+  Quaternion free_turn(const Body& b, double dt) const {
+    return impact::free_turn(inertia_of(b), dt, momentum, orientation.turned({0.0, 0.0, 1.0}));
+  }
 };
 
 /// For output: length, direction, orientation.

@@ -34,8 +34,10 @@ struct CapsuleInertia {
   double axial, across;  ///< about the axis; about any axis at right angles to it
 };
 
-/// Of a solid one with uniform density: a cylinder of `length` (m, between the centres of its caps) and two half balls. Exact.
+/// Of a solid one with uniform density: a cylinder of `length` (m, between the centres of its caps) and two half balls. Exact;
+/// infinite of an infinite mass.
 inline CapsuleInertia capsule_inertia(double mass, double radius, double length) {
+  if (std::isinf(mass)) return {mass, mass};
   const double cylinder = mass * length / (length + 4.0 / 3.0 * radius), caps = mass - cylinder, r2 = radius * radius;
   return {cylinder * r2 / 2.0 + caps * 0.4 * r2,
           cylinder * (length * length / 12.0 + r2 / 4.0) + caps * (0.4 * r2 + length * length / 4.0 + 0.375 * length * radius)};

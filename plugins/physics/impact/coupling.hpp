@@ -175,13 +175,8 @@ class Coupling {
       }
     }
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
-      Body& b = bodies_[i];
-      Attitude& attitude = logs_[i].attitude;
-      const CapsuleInertia own = capsule_inertia(b.mass, b.radius, attitude.length);
-      b.inertia = own.across;
-      b.axial_inertia = own.axial;
-      attitude.lay(b);
-      if (!logs_[i].moves) attitude.begin(b);
+      logs_[i].attitude.shape(bodies_[i]);
+      if (!logs_[i].moves) logs_[i].attitude.begin(bodies_[i]);
     }
   }
   Attitude first_attitude(const Body& b) const {

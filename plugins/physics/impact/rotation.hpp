@@ -32,6 +32,13 @@ inline Quaternion rotation_by(const Vec3<double>& turn) {
   return {std::cos(0.5 * angle), part * turn.x, part * turn.y, part * turn.z};
 }
 
+/// The direction and the angle (rad, at most half a turn) of a rotation; rotation_by() of it is q, or -q, which is the same.
+inline Vec3<double> turn_of(const Quaternion& q) {
+  const Vec3<double> axis{q.x, q.y, q.z};
+  const double sine = norm(axis), part = sine > 0.0 ? 2.0 * std::atan2(sine, std::fabs(q.w)) / sine : 2.0;
+  return (q.w < 0.0 ? -part : part) * axis;
+}
+
 inline Quaternion normalised(const Quaternion& q) {
   const double part = 1.0 / std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
   return {part * q.w, part * q.x, part * q.y, part * q.z};
@@ -63,12 +70,11 @@ struct SymmetricInertia {
   }
 };
 
-/// Orientation after free rotation for dt (s) of a body whose axis is its z; exact. The axis turns about the angular momentum
-/// (kg m^2/s), which stays, with |L| / across, and the body about its axis with (1 / axial - 1 / across) L u on top.
-inline Quaternion rotated_freely(const SymmetricInertia& inertia, double dt, const Vec3<double>& momentum, const Quaternion& orientation) {
-  const Vec3<double> z{0.0, 0.0, 1.0};
-  const double own = (1.0 / inertia.axial - 1.0 / inertia.across) * dot(momentum, orientation.turned(z));
-  return normalised(rotation_by((dt / inertia.across) * momentum) * orientation * rotation_by((dt * own) * z));
+/// Free rotation in dt (s) of a body with the axis u (unit); exact. The axis turns about the angular momentum (kg m^2/s), which stays, with
+/// |L| / across, and the body about its axis with (1 / axial - 1 / across) L u on top.
+inline Quaternion free_turn(const SymmetricInertia& inertia, double dt, const Vec3<double>& momentum, const Vec3<double>& u) {
+  const double own = (1.0 / inertia.axial - 1.0 / inertia.across) * dot(momentum, u);
+  return rotation_by((dt / inertia.across) * momentum) * rotation_by((dt * own) * u);
 }
 
 }  // namespace impact

@@ -280,6 +280,41 @@ TEST_CASE("the turn to an axis is the shortest one") {
   }
 }
 
+TEST_CASE("the mean spin of a step turns a log as it turns freely, up to half a turn and beyond") {
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  const auto vector = [&] { return Vec3<double>{normal(random), normal(random), normal(random)}; };
+  for (const double dt : {1e-9, 1e-3, 0.1, 1.0})
+    for (int trial = 0; trial < 50; ++trial) {
+      Body b = log_at({0, 0, 0}, 0.6 * vector());
+      Attitude attitude{2.0 * norm(b.half_axis), rotation_to(b.half_axis), {}};
+      b.spin = 5.0 * vector();
+      attitude.begin(b);
+      const Vec3<double> mean = attitude.mean_spin(b, dt);
+      const Quaternion before = attitude.orientation;
+      attitude.turn(b, dt);
+      const Quaternion turned = rotation_by(dt * mean) * before, &free = attitude.orientation;
+      const double same = turned.w * free.w + turned.x * free.x + turned.y * free.y + turned.z * free.z;
+      CHECK_THAT(std::fabs(same), WithinAbs(1.0, 1e-15));
+      CHECK(norm(turned.turned({1, 2, 3}) - free.turned({1, 2, 3})) < 1e-14);
+      CHECK(dt * norm(mean) < 3.1416);
+      if (dt < 1e-2) CHECK(norm(mean - b.spin) < 20.0 * dt * dot(b.spin, b.spin));
+    }
+  CHECK(norm(turn_of(Quaternion{})) == 0.0);
+}
+
+TEST_CASE("a log with an infinite mass has an infinite inertia and keeps its spin") {
+  Body b = log_at({0, 0, 0}, {0.5, 0, 0});
+  b.mass = INFINITY;
+  b.spin = {0, 0, 2.0};
+  Attitude attitude{1.0, rotation_to({1, 0, 0}), {}};
+  attitude.shape(b);
+  CHECK((std::isinf(b.inertia) && std::isinf(b.axial_inertia)));
+  attitude.turn(b, 0.25);
+  CHECK(norm(b.half_axis - 0.5 * Vec3<double>{std::cos(0.5), std::sin(0.5), 0}) < 1e-15);
+  CHECK(b.spin.z == 2.0);
+}
+
 TEST_CASE("a list of logs is read line by line, or refused with the line that is wrong") {
   const std::string path = "list_of_logs.txt";
   const auto read = [&](const std::string& text) {

@@ -39,7 +39,7 @@ def attributes():
     contact = O.interactions[0, 1].phys
     engines = {"loop": SphereContactLoop(), "liquid": CapillaryLiquid(), "account": EnergyAccount(), "monitor": IntegrationMonitor(),
                "impact": LcpImpact(), "wall": LogWall(), "fluid": SphFluid(), "motion": WallMotion(), "drum": CylinderWall(),
-               "snapshot": DembarkSnapshot(), "surface": FacetSurface(), "facets": Ig2_FacetSurface_Sphere_ScGeom(),
+               "capsule": Capsule(), "snapshot": DembarkSnapshot(), "surface": FacetSurface(), "facets": Ig2_FacetSurface_Sphere_ScGeom(),
                "box": Bo1_CylinderWall_Aabb(), "cylinders": Ig2_CylinderWall_Sphere_ScGeom()}
     objects = {"contact": contact, "ip2": ip2, "law": law, **engines}
     names = {"contact": ("tangensOfFrictionAngle", "kn", "ks", "normalForce", "shearForce", "kno", "betan", "capillaryForce", "slipp"),

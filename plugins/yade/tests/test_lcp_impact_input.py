@@ -10,14 +10,17 @@ import json
 from yade import dembark, utils
 said = []
 
-def scene():
+def scene(apart=0.2, **more):
     global bark, floor, newton
     O.reset()
     bark = O.materials.append(FrictMat(young=1e9, poisson=0.3, density=700, label="bark"))
-    O.bodies.append([utils.wall(0, 1, sense=1), dembark.log((0, 0.1, 0), 0.1, 30.0), dembark.log((0.2, 0.1, 0), 0.1, 30.0)])
+    O.bodies.append([utils.wall(0, 1, sense=1), *(dembark.log((x, 0.1, 0), 0.1, 30.0, **more) for x in (0, apart))])
     floor = dict(bodies=[0], stiffness=1e7, name="floor")
     newton = NewtonIntegrator(damping=0, gravity=(0, -9.81, 0))
     O.dt = 1e-5
+
+def capsules(apart=0.2):
+    scene(apart, length=1.0)
 
 def step(engine=None, between=(), **words):
     impact = LcpImpact(**{**dict(stiffness=1e7, walls=[floor]), **words}) if engine is None else engine
@@ -98,6 +101,19 @@ CASES = [
     ("O.bodies[1].state.inertia = (0, 0, 0)\nstep()", ("log 1 has an inertia of 0",)),
     ("O.bodies[1].aspherical = True\nstep()", ("log 1 is aspherical",)),
     ("O.bodies[1].state.pos = (0, 0.1, 0.01)\nstep()", ("log 1 meets log 2 out of the plane", "one z")),
+    ("O.bodies[0].state.angVel = (0, 1, 0)\nstep()", ("walls[0] 'floor': body 0 turns, and carries logs out of the plane",)),
+    ("capsules()\nO.bodies[0].state.angVel = (1, 1, 0)\nstep()", ("body 0 turns about another axis than its own", "its normal")),
+    ("Capsule(radius=0.1, length=-1)", ("Capsule.length is -1; it must be >= 0 m",)),
+    ("dembark.log((0, 0, 0), 0.1, 30.0, length=-1)", ("log: length -1: it must be >= 0 m",)),
+    ("dembark.log((0, 0, 0), 0.1, 30.0, length=1, axis=(0, 0, 0))", ("log: the axis must be x, y or z, or a direction that is not zero",)),
+    ("dembark.log((0, 0, 0), 0.1, 30.0, axis=(0, 0, 1))", ("log: axis '(0, 0, 1)': it must be x, y or z",)),
+    ("capsules()\nO.bodies[1].state.blockedDOFs = ''\nstep()", ("log 1 is a Capsule and has blockedDOFs ''", "'XYZ' (LcpImpact turns it)")),
+    ("capsules()\nO.bodies[1].state.mass = 0\nstep()", ("log 1 has a mass of 0 kg", "> 0")),
+    ("capsules(0.19)\nstep()", ("log 1 and log 2 overlap at the start by 0.1 of the radius",)),
+    ("capsules()\nO.bodies[2].state.pos = (0.5, 0.08, 0)\nstep()", ("log 2 and LcpImpact.walls[0] 'floor' overlap at the start",)),
+    ("capsules()\nO.bodies.append(dembark.log((0.5, 0.1, 0), 0.1, 30.0))\nstep()", ("log 3 has blockedDOFs 'zXY'", "blocked alike")),
+    ("capsules()\nO.bodies.append(utils.facet([(-1, 0, -1), (1, 0, -1), (0, 0, 1)]))\nstep(walls=[dict(floor, bodies=[3])])",
+     ("walls[0] 'floor': a Facet is for logs without a length, and log 1 has one; use Wall and CylinderWall",)),
     ("O.bodies.appendClumped([sphere((1, 1, 0), 0.1), sphere((1.1, 1, 0), 0.1)])\nstep()", ("belongs to a clump", "mask or ids")),
     ("O.bodies[2].state.pos = (0.19, 0.1, 0)\nstep()",
      ("LcpImpact: log 1 and log 2 overlap at the start by 0.1 of the radius; at most 0.05 is allowed",)),

@@ -2,7 +2,7 @@
 
 from itertools import count
 
-from yade import Omega, Sphere
+from yade import Capsule, Omega, Sphere
 from yade.dembark.scene import box
 from yade.dembark.states import options, table
 from yade.minieigenHP import Vector3
@@ -24,6 +24,10 @@ def motion(body, gravity=(0.0, 0.0, 0.0)):
     force, torque = O.forces.f(body.id) + state.mass * Vector3(*gravity), O.forces.t(body.id)
     velocity = [v if axis in state.blockedDOFs else v + 0.5 * O.dt * f / state.mass
                 for axis, v, f in zip("xyz", state.vel, force, strict=True)]
+    if isinstance(body.shape, Capsule):
+        # LcpImpact has turned its angular momentum on already.
+        own = state.ori.conjugate() * (state.angMom - 0.5 * O.dt * torque)
+        return force, velocity, state.ori * Vector3(*(m / i for m, i in zip(own, state.inertia, strict=True)))
     spin = [w if axis in state.blockedDOFs else w + 0.5 * O.dt * t / i
             for axis, w, t, i in zip("XYZ", state.angVel, torque, state.inertia, strict=True)]
     return force, velocity, spin
@@ -104,6 +108,8 @@ class FrameWriter:
         for body in spheres():
             _, velocity, spin = motion(body, self.gravity)
             energy += 0.5 * sum(body.state.mass * v * v for v in velocity)
+            if isinstance(body.shape, Capsule):
+                spin = body.state.ori.conjugate() * spin
             energy += 0.5 * sum(i * w * w for i, w in zip(body.state.inertia, spin, strict=True))
         self._history.write(",".join([str(O.iter), *(f"{x:.17g}" for x in (O.time, energy, *values))]) + "\n")
         self._history.flush()

@@ -1,12 +1,13 @@
-"""Logs in cross-section, for LcpImpact: bodies, the drum around them, engines, and what a case of logs is measured by."""
+"""Logs for LcpImpact: bodies, the drum around them, engines, and what a case of logs in cross-section is measured by."""
 
 import math
+from numbers import Real
 
-from yade import CylinderWall, ForceResetter, LogWall, NewtonIntegrator, Omega, PyRunner, utils
+from yade import Capsule, CylinderWall, ForceResetter, LogWall, NewtonIntegrator, Omega, PyRunner, utils
 from yade.dembark.frames import FrameWriter
 from yade.dembark.report import fail
 from yade.dembark.scene import packing
-from yade.minieigenHP import Vector3
+from yade.minieigenHP import Quaternion, Vector3
 
 O = Omega()
 
@@ -17,32 +18,51 @@ def _plane(axis, what):
     return "xyz".index(axis)
 
 
-def log(position, radius, mass, velocity=(0.0, 0.0, 0.0), spin=0.0, axis="z", material=-1, color=None):
-    """A log in cross-section, for LcpImpact: a sphere that moves in the plane across `axis` and turns about it.
+def _unit(axis, what):
+    direction = Vector3.Unit(_plane(axis, what)) if isinstance(axis, str) else Vector3(*map(float, axis))
+    if not 0.0 < direction.norm() < math.inf:
+        fail(f"{what}: the axis must be x, y or z, or a direction that is not zero")
+    direction.normalize()
+    return direction
+
+
+def log(position, radius, mass, velocity=(0.0, 0.0, 0.0), spin=0.0, axis="z", material=-1, color=None, length=None):
+    """A log for LcpImpact: in cross-section, a sphere that moves in the plane across `axis` and turns about it; with a length, a Capsule.
 
     position (m), radius (m, > 0), mass (kg, > 0, of the whole log), velocity (m/s), spin (rad/s, about `axis`); material: id, label
-    or Material. Its inertia is that of a solid cylinder, m r^2 / 2. Returns a body for O.bodies.append.
+    or Material. The inertia in cross-section is that of a solid cylinder, m r^2 / 2.
+    length : m, >= 0, of the cylinder between the centres of the caps; then `axis` may be any direction, and spin any vector. LcpImpact
+        sets the inertia, that of the solid capsule, in its first step.
+    Returns a body for O.bodies.append.
     """
-    k = _plane(axis, "log")
     for name, value, unit in (("radius", radius, "m"), ("mass", mass, "kg")):
         if not 0.0 < value < math.inf:
             fail(f"log: {name} {value:g}: it must be > 0 {unit}")
+    if length is not None and not 0.0 <= length < math.inf:
+        fail(f"log: length {length:g}: it must be >= 0 m")
+    if length is None:
+        _plane(axis, "log")
+    direction = _unit(axis, "log")
     body = utils.sphere(position, radius, material=material, color=color)
     body.state.mass = mass
-    body.state.inertia = Vector3(1, 1, 1) * (0.5 * mass * radius * radius)
     body.state.vel = Vector3(*velocity)
-    body.state.angVel = Vector3(*(spin if i == k else 0.0 for i in range(3)))
-    body.state.blockedDOFs = axis + "XYZ".replace(axis.upper(), "")
+    body.state.angVel = spin * direction if isinstance(spin, Real) else Vector3(*spin)
+    if length is None:
+        body.state.inertia = Vector3(1, 1, 1) * (0.5 * mass * radius * radius)
+        body.state.blockedDOFs = axis + "XYZ".replace(axis.upper(), "")
+    else:
+        body.shape = Capsule(radius=radius, length=length, color=body.shape.color)
+        body.state.ori = Quaternion(Vector3(0, 0, 1), direction)
+        body.state.blockedDOFs = "XYZ"
     return body
 
 
 def drum(centre, radius, axis="z", omega=0.0, material=-1):
     """The inside of a drum as a wall of LcpImpact, or of the contact laws: a CylinderWall that turns with omega (rad/s) about `axis`.
 
-    centre (m): any point of the axis; radius (m, > 0). Returns a body for O.bodies.append.
+    centre (m): any point of the axis; radius (m, > 0); axis: x, y, z or a direction. Returns a body for O.bodies.append.
     """
-    k = _plane(axis, "drum")
-    direction = Vector3(*(float(i == k) for i in range(3)))
+    direction = _unit(axis, "drum")
     body = utils.sphere(centre, radius, material=material, fixed=True)
     body.shape = CylinderWall(radius=radius, axis=direction)
     body.state.angVel = omega * direction
