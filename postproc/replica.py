@@ -13,7 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dembark.common.choices import Known
+from dembark.common.choices import Known, nearest
+from dembark.common.errors import DembarkError
 from dembark.common.parallel import cores_here
 
 from . import ContactFrame, ContactsDump, DumpError, GrainFrame, GrainsDump, read_times
@@ -35,6 +36,14 @@ class Replica:
     def parameters(self) -> Mapping[str, Any]:
         """Resolved parameters in SI units; KeyError with near matches for another name."""
         return Known(self.record["parameters"])
+
+    def number(self, name: str) -> float:
+        """The parameter `name`, in SI units; DembarkError with near matches when the run has no such number."""
+        numbers = {one: float(value) for one, value in self.record.get("parameters", {}).items()
+                   if isinstance(value, int | float) and not isinstance(value, bool)}
+        if name not in numbers:
+            raise DembarkError(f"the run in {self.folder} has no number of the name {name!r}", nearest(name, numbers))
+        return numbers[name]
 
     @property
     def derived(self) -> Mapping[str, Any]:

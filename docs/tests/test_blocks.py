@@ -34,6 +34,7 @@ fixed = { grain_count = 100, grain_diameter = "8 mm", settle_time = "0.1 s", mea
 """
 # Files that a page takes for granted, and the file of an earlier command that is taken for them.
 TAKEN_FOR = {"run.dump": "out/small/replica-1/grains.dump", "contacts.dump": "out/small/replica-1/contacts.dump",
+             "space.txt": "out/drum/replica-1/impacts.txt", "space.dump": "out/drum/replica-1/grains.dump",
              # What README.md has computed under another name is kept.
              "results/campaigns/silo-small": "study"}
 RUNNERS = {

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
 
 from ..grains import GrainsDump
 from ..impacts import Impacts, read_impacts
+from ..replica import Replica
 from .dose import Logs
 from .outcomes import Load
 
@@ -67,12 +67,7 @@ def load_of(file: Path, given: Given) -> Load:
 
 def parameter(file: Path, name: str) -> float:
     """The number that the run of a file of impacts has for a parameter; DembarkError where it has none."""
-    known = (read_json(file.parent / "run.json") or {}).get("parameters", {})
-    value = known.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        numbers = [one for one, number in known.items() if isinstance(number, int | float) and not isinstance(number, bool)]
-        raise DembarkError(f"the run of {file} has no number of the name {name!r}", nearest(name, numbers))
-    return float(value)
+    return Replica(file.parent, read_json(file.parent / "run.json") or {}).number(name)
 
 
 def _last(impacts: Impacts, record: Mapping[str, Any]) -> float:
