@@ -116,7 +116,8 @@ class Album:
 
     def _meshes(self, steps: NDArray[np.int64]) -> list[Array]:
         """Triangles (steps, t, 3, 3) in m of the meshes of the run at each step: at rest, or moved by the columns motion_x, ... of its
-        history. Meshes that turn are left out, for the history does not say about which axis."""
+        history. Meshes that do no work while another does are at rest. Meshes that turn are left out, for the history does not say about
+        which axis."""
         assert self.folder
         files = sorted(self.folder.glob("*.stl"))
         if not files:
@@ -131,7 +132,9 @@ class Album:
             return []
         way = np.column_stack([np.interp(steps, rows["step"], rows[f"motion_{axis}"]) if "motion_x" in rows else np.zeros(len(steps))
                                for axis in "xyz"])
-        return [np.asarray(read_stl(file).triangles)[None] + way[:, None, None, :] for file in files]
+        working = {name.removesuffix("_work") for name, column in rows.items() if name.endswith("_work") and column.any()}
+        resting = {file for file in files if working and f"{file.stem}_work" in rows and file.stem not in working}
+        return [np.asarray(read_stl(file).triangles)[None] + (0.0 if file in resting else 1.0) * way[:, None, None, :] for file in files]
 
     def _sheet(self) -> Sheet:
         """Everything that is in any frame, and the colour scale of all of them."""

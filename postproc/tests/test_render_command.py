@@ -11,7 +11,7 @@ from dumps import contacts_text, grains_text, write_times
 from PIL import Image
 
 from dembark.common.errors import DembarkError
-from dembark.postproc import render
+from dembark.postproc import read_times, render
 from dembark.postproc.pictures import PICTURE, draw
 from dembark.postproc.pictures.scenes import Album, Look
 from dembark.postproc.sources import frames_at, open_source
@@ -80,6 +80,14 @@ def test_scenes_have_the_grains_walls_and_times_of_their_frames(run):
     assert all(surface.opacity < 0.5 for surface in last.surfaces)
     bare = Album(open_source(run), [0], Look(walls=False))
     assert scenes(bare)[0].surfaces == () and bare.notes == []
+
+
+@pytest.mark.parametrize(("works", "height"), [({"lid": 0.0, "cup": 1.0}, 0.4), ({"lid": 1.0, "cup": 0.0}, 0.8),
+                                               ({"lid": 0.0, "cup": 0.0}, 0.8), ({"cup": 1.0}, 0.8)])
+def test_a_mesh_that_does_no_work_while_another_does_is_at_rest(run, works, height):
+    rows = read_times(run / "time.csv")
+    write_times(run / "time.csv", rows | {f"{name}_work": np.linspace(0.0, work, 4) for name, work in works.items()})
+    np.testing.assert_allclose(scenes(album(run))[-1].surfaces[0].triangles[0, :, 2], height)
 
 
 def test_all_frames_have_one_scale_and_one_camera(run):
