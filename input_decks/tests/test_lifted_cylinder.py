@@ -90,7 +90,8 @@ def controls_lifted_cylinder(_: Path) -> Iterator[Control]:
     yield Control("a grain that leaves over the rim", verdicts(*steep), verdicts(*steep, lost=1))
     yield Control("gravity 5 % too weak", verdicts(*steep), verdicts(*steep, heavier=0.95))
     yield Control("a column that only slumps", released(1.25, 0.7), released(0.6, 1.2))
-    yield Control("a column that only slumps", released(1.25, 0.88), released(0.6, 1.2))
+    # What the inputs may change leaves hardly any room: a cone that is measured as the law within half a percent.
+    yield Control("a column that only slumps", released(1.22, 0.885), released(0.6, 1.2))
 
 
 @settings(max_examples=25, deadline=None)
@@ -171,5 +172,5 @@ def test_a_heap_is_left(engine: str, simulate: Any) -> None:
     found = judged("lifted_cylinder", lifted.measure([one]))
     assert names(found, "pass") == {"off_plate", "weight_error", "impulse_error"}
     first, last = (lifted.heap(one.grains()[k], D) for k in (0, -1))
-    # The column is lower, and wider than the cylinder was.
-    assert last.base > 1.3 * first.base and last.height < first.height and 5.0 < found["angle"]["value"] < 40.0
+    # Lower and wider than the column; two to three grains high, so that its slope says little.
+    assert last.base > 1.3 * first.base and last.height < 0.7 * first.height and 0.0 < found["angle"]["value"] < 40.0
