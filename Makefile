@@ -104,6 +104,7 @@ doctor: $(BUILD)/.python ## say what is found, what is missing and what to do
 	@$(BIN)/dembark doctor
 
 lint: $(VENV)/.complete ## check the sources: rules, types, layout
+	@if git grep -nE '^(<<<<<<<|>>>>>>>) '; then echo "dembark: an unfinished merge is in these lines" >&2; exit 1; fi
 	@$(BIN)/ruff check
 	@$(BIN)/mypy
 	@git ls-files '*.c' '*.cpp' '*.hpp' '*.h' | xargs -r $(BIN)/clang-format --dry-run -Werror
