@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from dembark.validation import doctor, engines
+from dembark.validation.case import folders
 from dembark.validation.engines.yade import Yade
 
 
@@ -19,11 +20,14 @@ def test_parts_that_a_build_lacks_are_named_by_the_doctor(features: str, lacking
     monkeypatch.setenv("DEMBARK_YADE", str(program))
     monkeypatch.setenv("DEMBARK_TOLD_BY_YADE", "")
     monkeypatch.setattr(engines, "ENGINES", (Yade,))
-    engines.find.cache_clear()
+    # A case that is loaded here has decks for YADE alone.
+    for cache in (engines.find, folders.load):
+        cache.cache_clear()
     try:
         found = [one for one in doctor.examine() if one.what == "parts of YADE"]
     finally:
-        engines.find.cache_clear()
+        for cache in (engines.find, folders.load):
+            cache.cache_clear()
     assert len(found) == bool(lacking)
     for one in found:
         assert not one.required and one.found is None and all(part in one.advice for part in (*lacking, "YADE_PREFIX", "make yade-plugin"))
