@@ -13,6 +13,7 @@ from dembark.input_decks.common.estimates import over_chaotic, reference_rows
 from dembark.input_decks.common.heaps import at_rest, height
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array, Estimate, Measurement, Replica, Replicas, Value, exact, profile
+from dembark.postproc.replica import cached_per_replica
 
 CODE = Path(__file__).with_name("reference") / "moose_column.csv"
 # Height of the deposits of the other code over R, for H/R of 1 and more: from 0.63 to 0.71.
@@ -82,9 +83,16 @@ def heap(frame: GrainFrame, diameter: float) -> Heap:
     return Heap(-math.degrees(math.atan(slope)), top, base)
 
 
+@cached_per_replica
+def ends(replica: Replica) -> tuple[GrainFrame, GrainFrame, GrainFrame]:
+    """The first frame, the last but one, and the last."""
+    frames = replica.grains()
+    return frames[0], frames[-2], frames[-1]
+
+
 def off_plate(replica: Replica) -> int:
     """Grains that have gone, or are outside of the rim or below the plate, in the last frame."""
-    p, last = replica.parameters, replica.grains()[-1]
+    p, last = replica.parameters, ends(replica)[-1]
     on = (np.hypot(*last.positions[:, :2].T) < p["plate_radius"]) & (last.positions[:, 2] > 0.0)
     return int(replica.derived["poured"] - on.sum())
 
@@ -92,8 +100,7 @@ def off_plate(replica: Replica) -> int:
 def balances(replica: Replica) -> tuple[float, float]:
     """Mean force on the plate over the weight − 1, after the last frame but one; and impulse of plate and cylinder, less that of the weight
     and what the grains gain, from the first to the last frame, over that of the weight."""
-    rows, frames = replica.times(), replica.grains()
-    first, before, last = frames[0], frames[-2], frames[-1]
+    rows, (first, before, last) = replica.times(), ends(replica)
     weight = last.masses.sum() * replica.parameters["gravity"]
     force = rows["pan_fz"][rows["step"] > before.step].mean()
     gained = last.masses @ last.velocities[:, 2] - first.masses @ first.velocities[:, 2]
@@ -106,7 +113,7 @@ def balances(replica: Replica) -> tuple[float, float]:
 def measure(replicas: Replicas) -> Measurement:
     """Of all packings: the heap; where nothing rubs, its slope alone; where the cylinder releases a column, its run-out and height."""
     p, d, radius = replicas[0].parameters, replicas[0].parameters["grain_diameter"], replicas[0].parameters["cylinder_radius"]
-    lasts = [replica.grains()[-1] for replica in replicas]
+    lasts = [ends(replica)[-1] for replica in replicas]
     heaps, errors = [heap(last, d) for last in lasts], np.abs([balances(replica) for replica in replicas])
     moving = "" if all(at_rest(last, p["gravity"], d) for last in lasts) else "the grains still move"
     angle = over_chaotic(one.angle for one in heaps)
@@ -117,7 +124,7 @@ def measure(replicas: Replicas) -> Measurement:
         return Measurement(values | {"level_angle": Value(angle, exact(0.0))}, [_surface(replicas)])
     values |= {"angle": Value(angle, reason=moving), "heap_height": Value(over_chaotic(one.height / d for one in heaps)),
                "base_radius": Value(over_chaotic(one.base / d for one in heaps))}
-    columns = [height(replica.grains()[0]) for replica in replicas]
+    columns = [height(ends(replica)[0]) for replica in replicas]
     if replicas[0].derived["lift_time"] < RELEASED * math.sqrt(np.mean(columns) / p["gravity"]):
         aspect = over_chaotic(one / radius for one in columns)
         run_out, deposit = over_chaotic(one.base / radius - 1.0 for one in heaps), over_chaotic(one.height / radius for one in heaps)
@@ -136,7 +143,7 @@ def _surface(replicas: Replicas) -> dict[str, Any]:
     p = replicas[0].parameters
     d = p["grain_diameter"]
     edges = d * np.arange(round(p["plate_radius"] / d) + 1, dtype=np.float64)
-    tops = [[ring_heights(frame, edges) / d for frame in (replica.grains()[0], replica.grains()[-1])] for replica in replicas]
+    tops = [[ring_heights(frame, edges) / d for frame in (first, last)] for first, _, last in map(ends, replicas)]
     return profile("heap", "Surface of the heap", "distance from the axis / d", "height / d", 0.5 * (edges[1:] + edges[:-1]) / d,
                    [last for _, last in tops], reference=np.mean([first for first, _ in tops], axis=0),
                    reference_label="when the lift begins")

@@ -51,8 +51,8 @@ def files_of(path: Path) -> list[Path]:
 
 def load_of(file: Path, given: Given) -> Load:
     """The load whose impacts are in `file`; DembarkError or DumpError in one line where something is missing."""
-    record = read_json(file.parent / "run.json") or {}
-    speed = parameter(file, given.speed) if isinstance(given.speed, str) else given.speed
+    run = _run(file)
+    record, speed = run.record, run.number(given.speed) if isinstance(given.speed, str) else given.speed
     if not speed > 0.0:
         raise DembarkError(f"the speed of the drum of {file} is {speed:g} rad/s", "", "it must be > 0")
     impacts, period = read_impacts(file), 2.0 * math.pi / speed
@@ -67,7 +67,11 @@ def load_of(file: Path, given: Given) -> Load:
 
 def parameter(file: Path, name: str) -> float:
     """The number that the run of a file of impacts has for a parameter; DembarkError where it has none."""
-    return Replica(file.parent, read_json(file.parent / "run.json") or {}).number(name)
+    return _run(file).number(name)
+
+
+def _run(file: Path) -> Replica:
+    return Replica(file.parent, read_json(file.parent / "run.json") or {})
 
 
 def _last(impacts: Impacts, record: Mapping[str, Any]) -> float:

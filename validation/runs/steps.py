@@ -217,15 +217,16 @@ def verify(folder: Path) -> None:
 
 def build_report(folder: Path) -> None:
     """Write report.html and report.pdf into a results folder (results/<profile> or a campaign's); RunError when that fails."""
-    inputs_hash, page = _of_report(folder), folder / "report.html"
+    page = folder / "report.html"
     # Better none than one of other results.
     page.unlink(missing_ok=True)
+    if results.plan(folder).get("cases"):
+        (folder / VERIFICATION).unlink(missing_ok=True)
+    inputs_hash = _of_report(folder)
     with _in_one_line(f"the report of {folder} could not be built"):
         # Its libraries are those of an extra.
         from dembark.validation import report
         from dembark.validation.campaigns.report import build as campaign_report
 
-        if results.plan(folder).get("cases"):
-            (folder / VERIFICATION).unlink(missing_ok=True)
         (campaign_report if (folder / CAMPAIGN_FILE).is_file() else report).build(folder)
         write_atomic(page, inputs.stamp(page.read_text(encoding="utf-8"), inputs_hash).encode())

@@ -247,3 +247,13 @@ def test_a_report_is_built_anew_when_a_verdict_changes_and_kept_otherwise(
     assert times[0] == times[1] < times[2] == times[3]
     assert [one[1:] for one in facts] == [(False, 1, "x", 1), (False, 0, "x", 0), (True, 0, "x", 0), (True, 0, "x", 0)]
     assert read_json(tmp_path / "results/quick/box/dry/liggghts/metrics.json")["inputs_hash"]
+
+
+def test_a_report_of_some_cases_is_kept_although_that_of_all_left_a_verification(
+        box: Path, tmp_path: Path, command: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, function in STAND_INS:
+        if name not in ("metrics", "judge.comparison"):
+            monkeypatch.setattr(import_module(f"dembark.validation.{name}"), function.__name__, function)
+    built = [command("validate", *words)[2].count("report: started") for words in ((), ("--case", "box"), ("--case", "box"))]
+    assert built == [1, 1, 0]
+    assert not (tmp_path / "results/quick/verification.json").exists()
