@@ -15,6 +15,7 @@ import typer
 from dembark.common.errors import DembarkError, Interrupted
 from dembark.common.extras import missing_extra
 from dembark.common.files import write_atomic
+from dembark.common.signals import interruptible
 from dembark.common.units import to_si
 
 from .cli_options import (
@@ -64,9 +65,8 @@ Plot = Annotated[Path | None, typer.Option(metavar="FOLDER", help="Draw plots (P
 
 def run(words: Sequence[str]) -> int:
     """Run one of the commands with its `words` (the first is its name); returns the exit code. DembarkError for the user's mistakes."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        with warnings.catch_warnings():
+        with interruptible(signal.SIGTERM), warnings.catch_warnings():
             # The summary says what was odd in the files.
             warnings.simplefilter("ignore", DumpWarning)
             code = app(args=list(words), prog_name="dembark", standalone_mode=False)
@@ -80,8 +80,6 @@ def run(words: Sequence[str]) -> int:
         raise DembarkError(error.named(options[type(error)])) from None
     except DumpError as error:
         raise DembarkError(str(error)) from None
-    finally:
-        signal.signal(signal.SIGTERM, before)
     if code == Interrupted.exit_code:
         # Typer makes this of a KeyboardInterrupt, without a message.
         raise Interrupted("interrupted")

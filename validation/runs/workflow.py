@@ -15,6 +15,7 @@ from dembark.common.errors import DembarkError
 from dembark.common.files import disk_error, read_json, write_json
 from dembark.common.lock import lock
 from dembark.common.parallel import cores_here
+from dembark.common.signals import ENDING, interruptible
 from dembark.validation import results
 from dembark.validation.campaigns import expand
 from dembark.validation.campaigns.plan import Plan, Resources, Series
@@ -36,7 +37,7 @@ def cancelled_by_signal() -> threading.Event:
     def handler(_number: int, _frame: FrameType | None) -> None:
         event.set()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in ENDING:
         signal.signal(number, handler)
     return event
 
@@ -89,7 +90,8 @@ def conclude(folder: Path, cancel: threading.Event, cores: int) -> Outcome:
     with lock(folder / LOCK, f"another process works in {folder}"):
         *before, _ = steps(folder)
         outcome = _execute(folder, (), before, cancel, cores)
-        build_report(folder)
+        with interruptible(*ENDING):
+            build_report(folder)
         return outcome
 
 
@@ -142,7 +144,9 @@ def perform_series(one: Series, out: Path, cancel: threading.Event, used: Resour
             if message != str(first):
                 print(f"dembark: {message}", file=sys.stderr)
         raise first
-    return measure_series(out, one.runs[0].case.name, {run.folder_name: run.inputs for run in one.runs})
+    # It is done in this process, where nothing looks at `cancel`.
+    with interruptible(*ENDING):
+        return measure_series(out, one.runs[0].case.name, {run.folder_name: run.inputs for run in one.runs})
 
 
 def refuse_foreign(one: Series, out: Path) -> None:

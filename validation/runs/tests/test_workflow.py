@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import time
 from collections.abc import Callable
@@ -160,6 +161,25 @@ def test_an_interrupted_workflow_goes_on_where_it_was(
     code, _, error = command("validate")
     assert code == 0 and error.count("already finished; reusing") == 2 and error.count("1: finished in") == 1
     assert not list(results.glob("**/.replica-1.part-*"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(("words", "what"), [
+    (["run", "box", "--engine", "liggghts", "--out", "run"], "dembark.validation.metrics.measure"),
+    (["report"], "dembark.validation.report.build"),
+])
+def test_a_signal_ends_measurements_and_reports_that_this_process_makes(
+        command: Command, monkeypatch: pytest.MonkeyPatch, number: int, words: list[str], what: str) -> None:
+    assert command("validate")[0] == 0
+
+    def interrupted(*_: object) -> None:
+        os.kill(os.getpid(), number)
+        time.sleep(1.0)
+        pytest.fail("the signal changed nothing")
+
+    monkeypatch.setattr(what, interrupted)
+    code, _, error = command(*words)
+    assert code == 130 and error.splitlines()[-1] == "dembark: interrupted"
 
 
 def test_two_validations_of_one_profile_do_not_mix(
