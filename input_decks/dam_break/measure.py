@@ -10,13 +10,12 @@ from scipy.stats import linregress
 
 from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
+from dembark.input_decks.common.water_run import common_values
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Numbers, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.replica import cached_per_replica
 from dembark.postproc.statistics import student
 from dembark.postproc.studies import compared, measured, numerical, quantity
-
-from .water import common_values
 
 MEASURED = Path(__file__).with_name("reference") / "fronts.csv"
 NAMES = {"martin_moyce": "Martin & Moyce (1952)", "koshizuka_oka": "Koshizuka & Oka (1996)"}

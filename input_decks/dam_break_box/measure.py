@@ -9,8 +9,8 @@ import numpy as np
 
 from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
-from dembark.input_decks.dam_break.water import Tank, growth
-from dembark.input_decks.dam_break.water import pressure as fluid_pressure
+from dembark.input_decks.common.water_run import Tank, growth
+from dembark.input_decks.common.water_run import pressure as fluid_pressure
 from dembark.postproc import GrainsDump
 from dembark.postproc.convergence import convergence
 from dembark.postproc.measurement import (

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
-from dembark.input_decks.dam_break.water import Tank
+from dembark.input_decks.common.water_run import Tank
 from dembark.postproc.convergence import convergence
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Estimate, Measurement, Points, Replica, Replicas, Value, exact, over_replicas, profile

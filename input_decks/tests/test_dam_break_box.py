@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dembark.input_decks.dam_break.water import pressure
+from dembark.input_decks.common.water_run import pressure
 from dembark.input_decks.dam_break_box.sensors import GAUGES
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc import GrainsDump, read_times

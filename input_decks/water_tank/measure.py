@@ -7,7 +7,7 @@ import numpy as np
 
 from dembark.input_decks.common.estimates import reference_rows
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
-from dembark.input_decks.dam_break.water import common_values, pressure
+from dembark.input_decks.common.water_run import common_values, pressure
 from dembark.postproc.history import reached
 from dembark.postproc.measurement import Array, Curve, Measurement, Points, Replica, Replicas, Value, exact, profile
 from dembark.postproc.studies import measured

@@ -1,4 +1,4 @@
-"""A fluid of particles, compared with water."""
+"""Runs of a fluid of particles: pressures, growth of energy, and what is outside of the walls."""
 
 from __future__ import annotations
 
