@@ -103,7 +103,7 @@ def fields(
     least_contacts: Annotated[int, typer.Option(min=0, help=(
         "With --cells: cells with fewer contacts in all averaged frames are masked."))] = 3000,
     only: Annotated[str | None, typer.Option("--fields", metavar="NAME,...", help="Write these only: density,velocity,stress.")] = None,
-    out: Annotated[Path | None, typer.Option(help="NetCDF file of the fields, for xarray.")] = None,
+    out: Annotated[Path | None, typer.Option(help="NetCDF file of the fields, NAME.nc, for xarray.")] = None,
     paraview: Annotated[Path | None, typer.Option(help="Collection of VTK files of the fields for ParaView, NAME.pvd.")] = None,
     grains: Annotated[Path | None, typer.Option(help="The same for the grains of these frames.")] = None,
     plot: Plot = None,
@@ -158,7 +158,7 @@ def walls(
     wall: Walls = None,
     patch: Annotated[str, typer.Option(help="Size of the patches: 2d (mean diameters), '5 mm'; those of a mesh are its triangles.")] = "2d",
     frames: Frames = ":",
-    out: Annotated[Path | None, typer.Option(help="NetCDF file, a group for each wall, for xarray.")] = None,
+    out: Annotated[Path | None, typer.Option(help="NetCDF file, NAME.nc, a group for each wall, for xarray.")] = None,
     paraview: Annotated[Path | None, typer.Option(help=(
         "Collection of VTK files of the patches for ParaView, NAME.pvd; with several walls NAME_WALL.pvd."))] = None,
     plot: Plot = None,
@@ -236,7 +236,7 @@ def debark(
     against: Annotated[str | None, typer.Option(metavar="PARAMETER", help=(
         "Compare the IMPACTS or RUNs by this parameter of theirs, such as filling or drum_speed."))] = None,
     sectors: Annotated[int, typer.Option(min=1, max=3600, help="Sectors of the circumference.")] = 12,
-    out: Annotated[Path | None, typer.Option(help="NetCDF file of doses and degree, for xarray.")] = None,
+    out: Annotated[Path | None, typer.Option(help="NetCDF file of doses and degree, NAME.nc, for xarray.")] = None,
     plot: Plot = None,
 ) -> None:
     """Degree of debarking and wood damage from the impacts of logs in a drum."""
@@ -327,9 +327,7 @@ def render(
         raise DembarkError("--at is for pictures of single times", "", "leave --frames and --film out")
     suffixes = drawing.FILMS if film else drawing.STILLS
     place = out or Path(f"{source.resolve().name.split('.')[0]}{suffixes[0]}")
-    if place.suffix not in suffixes:
-        raise DembarkError(f"{place.name} does not end in {', '.join(suffixes)}", "in --out", "take one of these")
-    check_places(place, read=(source, contacts))
+    check_places(place, suffixes=suffixes, read=(source, contacts))
     drawing.View.named(view or "iso")
     look = Look(colour_by, unit, value_range(span) if span else None, colours=colours, view=view, cut=cut, surface=surface, walls=not bare,
                 size=picture_size(size) if size else None)
@@ -388,9 +386,7 @@ def tracks(
     from . import tracks as tracking
     from .track_report import dataset, figures, lines
 
-    if out and out.suffix not in (".csv", ".nc"):
-        raise DembarkError(f"{out.name} does not end in .csv or .nc", "in --out", "take one of these")
-    check_places(out, plot=plot, read=(source, contacts, against))
+    check_places(out, suffixes=(".csv", ".nc"), plot=plot, read=(source, contacts, against))
     ids = grain_numbers(grains, "in --grains") if grains else None
     between = lags(diffusion) if diffusion else None
     measured = tracking.read_csv(against) if against else None

@@ -16,8 +16,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from dembark.common.errors import DembarkError
 
 
-def check_places(out: Path | None, *collections: Path | None, plot: Path | None = None, read: Iterable[Path | None]) -> None:
-    """DembarkError when an output cannot be where it shall be, or two are the same file, or one is a file that is `read`."""
+def check_places(out: Path | None, *collections: Path | None, suffixes: Sequence[str] = (".nc",), plot: Path | None = None,
+                 read: Iterable[Path | None]) -> None:
+    """DembarkError when an output cannot be where it shall be, when `out` has none of the `suffixes` of what is written to it, or when two
+    are the same file, or one is a file that is `read`."""
     sources = [file for path in read if path
                for file in (path, *(path.glob("*.dump") if path.is_dir() else path.parent.glob(path.name))) if file.is_file()]
     given = [path for path in (out, *collections) if path is not None]
@@ -30,6 +32,8 @@ def check_places(out: Path | None, *collections: Path | None, plot: Path | None 
             raise DembarkError(f"{path} is a file that is read", "", "name another place")
         if given.count(path) > 1:
             raise DembarkError(f"{path} is named twice", "", "give each output a file of its own")
+    if out is not None and out.suffix not in suffixes:
+        raise DembarkError(f"{out.name} does not end in {' or '.join(suffixes)}", "in --out")
     if any(collections):
         from .output.paraview import check_place
 

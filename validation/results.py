@@ -199,8 +199,10 @@ def export(folder: Path | str, table: str, target: Path | None = None) -> str:
     .json or .parquet. DembarkError for another name, a folder without results, and where Parquet files need a package that is not
     installed."""
     found = TABLES[pick(table, TABLES, "table", "in --table")](folder)
-    if found.empty and TABLES["quantities"](folder).empty:
-        raise DembarkError(f"no results in {folder}", "", "give the folder of a profile, a campaign or a run")
+    if found.empty:
+        if TABLES["quantities"](folder).empty:
+            raise DembarkError(f"no results in {folder}", "", "give the folder of a profile, a campaign or a run")
+        raise DembarkError(f"no {table} in {folder}", "it has results, of quantities")
     if target is None:
         return found.to_csv(index=False)
     suffix = target.suffix.lower()

@@ -83,9 +83,9 @@ class TimeSeries:
 
     def add(self, data: pyvista.ImageData | pyvista.PolyData, time: float, units: Mapping[str, str]) -> None:
         """Add the data set of `time` (s) with the `units` of its arrays; RunError when the disk refuses."""
-        data.field_data["units"] = [f"{name}: {unit}" for name, unit in units.items()]
+        data.field_data["units"] = [_ascii(f"{name}: {unit}") for name, unit in units.items()]
         for name, value in self._attributes.items():
-            data.field_data[name] = [value]
+            data.field_data[name] = [_ascii(value) if isinstance(value, str) else value]
         import pyvista
         from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLPolyDataWriter
 
@@ -121,6 +121,11 @@ class TimeSeries:
             raise disk_error(refused, self.path) from None
         finally:
             shutil.rmtree(self._work, ignore_errors=True)
+
+
+def _ascii(text: str) -> str:
+    """`text` with escapes for letters that PyVista does not take, as in a path."""
+    return text.encode("ascii", "backslashreplace").decode()
 
 
 def _folder(path: Path) -> Path:

@@ -52,6 +52,19 @@ def floor_load(name="floor"):
     return wall_stress([frame], floor, plane_patches(floor, np.arange(3.0), np.arange(2.0)))
 
 
+def test_names_and_texts_beyond_ascii_are_written_with_escapes(tmp_path):
+    """PyVista refuses such texts, and a path or the name of a column may have them."""
+    path = tmp_path / "grüße.pvd"
+    frame = frame_of([[0.2, 0.2, 0.1]], extra={"c_µ": np.array([2.0])})
+    write_grains(path, [frame], attributes={"source": "/home/jürgen/run"})
+    grains = times_of(path)[1](0.0)
+    assert grains.field_data["source"][0] == "/home/j\\xfcrgen/run" and grains["c_µ"][0] == 2.0
+    assert "c_\\xb5: as in the dump" in list(grains.field_data["units"])
+    write_wall(tmp_path / "w.pvd", floor_load("böden"))
+    write_fields(tmp_path / "f.pvd", dataset(fields_of(), attributes={"history": "…", "wide": 1.5}))
+    assert times_of(tmp_path / "f.pvd")[1](0.0).field_data["wide"][0] == 1.5
+
+
 def load(count=3, motion=None):
     """A cylinder wall with uniform pressure that grows with time."""
     wall = CylinderWall("side", 2.0) if motion is None else CylinderWall("side", 2.0, motion=motion)

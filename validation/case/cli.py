@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -85,4 +86,5 @@ def new_case(
             (target / path.name).write_text(path.read_text(encoding="utf-8").replace("NAME", name), encoding="utf-8")
     except OSError as error:
         raise DembarkError(f"cannot write to {target}", error.strerror or str(error)) from None
-    print(f"{target} is a case now. Run it: dembark --cases {folder} run {name} --engine {engines.names()[0]} --out results-{name}")
+    words = ["dembark", "--cases", str(folder), "run", name, "--engine", engines.names()[0], "--out", f"results-{name}"]
+    print(f"{target} is a case now. Run it: {shlex.join(words)}")

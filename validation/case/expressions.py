@@ -16,12 +16,25 @@ from . import syntax
 # A parameter may have the name of a function: calls are renamed.
 _FUNCTIONS = {"min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "ceil": math.ceil, "floor": math.floor, "round": round,
               "sin": math.sin, "cos": math.cos}
-_CALLED = {f"{name}()": function for name, function in _FUNCTIONS.items()}
+# Whole numbers of more bits are those of a slip; Python would compute any number of digits.
+_BITS = 1024
 _CONSTANTS = {"pi": math.pi}
 _ALLOWED = (ast.Name, ast.Load, ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.UnaryOp, ast.USub, ast.UAdd, ast.Not,
             ast.BoolOp, ast.And, ast.Or, ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 
 Values = Mapping[str, Any]
+
+
+def _power(base: float, exponent: float) -> float:
+    """base ** exponent; OverflowError where it is too large, ValueError where it is not real."""
+    if isinstance(base, int) and isinstance(exponent, int):
+        if exponent * base.bit_length() > _BITS:
+            raise OverflowError("the number is too large")
+        return base**exponent
+    return math.pow(base, exponent)
+
+
+_CALLED = {"power()": _power, **{f"{name}()": function for name, function in _FUNCTIONS.items()}}
 
 
 class Expression:
@@ -97,6 +110,10 @@ class _Reader(ast.NodeTransformer):
     def visit_Name(self, node: ast.Name) -> ast.AST:
         self.names |= {node.id} - _CONSTANTS.keys()
         return node
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        return ast.Call(ast.Name("power()", ast.Load()), [node.left, node.right], []) if isinstance(node.op, ast.Pow) else node
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         if not isinstance(node.func, ast.Name) or node.keywords:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from importlib.metadata import version
 from pathlib import Path
 
@@ -150,6 +151,13 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("DEMBARK_CASES", str(tmp_path / "cases"))
     assert main(["new-case", "mine", "--template", "packing", "--in", str(tmp_path / "cases")]) == 0
     return tmp_path / "cases/mine"
+
+
+def test_the_command_that_runs_a_new_case_can_be_pasted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "my cases (ü)"
+    assert main(["new-case", "mine", "--in", str(folder)]) == 0
+    words = shlex.split(capsys.readouterr().out.partition("Run it: ")[2])
+    assert words[:5] == ["dembark", "--cases", str(folder), "run", "mine"]
 
 
 @pytest.mark.parametrize(("file", "old", "new", "expected"), [

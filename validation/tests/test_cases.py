@@ -309,6 +309,21 @@ def test_expressions_agree_with_python(a: float, b: float) -> None:
     assert Expression("0 < a < b")(values) == (0 < a < b)
 
 
+@given(st.floats(1e-3, 1e3) | st.floats(-1e3, -1e-3), st.integers(-20, 20), st.integers(-20, 20))
+def test_powers_are_those_of_python(a: float, m: int, n: int) -> None:
+    for base, exponent in ((a, n), (m, n)):
+        if base == 0 and exponent < 0:
+            continue
+        found, expected = Expression("-x ** n * 2")({"x": base, "n": exponent}), -(base**exponent) * 2
+        assert found == expected and type(found) is type(expected)
+
+
+@pytest.mark.parametrize("text", ["9 ** 9 ** 9 ** 9", "10.0 ** 999", "(-8) ** (1 / 3)", "0 ** -1", "1 / 0", "sqrt(-1)"])
+def test_an_expression_without_a_real_value_says_so_at_once(text: str) -> None:
+    with pytest.raises(DembarkError, match="cannot be evaluated"):
+        Expression(text).evaluated({})
+
+
 def test_expressions_go_to_other_processes() -> None:
     again = pickle.loads(pickle.dumps(Expression("first(a, b) > 1 and c > 0")))
     assert again.names == {"a", "b", "c"} and again({"b": 2, "c": 1}) is True and again({"b": 2}) is None

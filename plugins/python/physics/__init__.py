@@ -1,4 +1,4 @@
-"""Contact laws of dembark on numpy arrays: the same headers that run in LIGGGHTS and YADE.
+"""Contact laws of dembark on numpy arrays: the same headers that run in the engines.
 
 All quantities are in SI units.
 """

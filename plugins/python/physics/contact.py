@@ -1,7 +1,7 @@
-"""A single contact and small two-body systems without an engine, stepped like LIGGGHTS and YADE step them.
+"""A single contact and small two-body systems without an engine, stepped like the engines step them.
 
-The integrator is the leapfrog that both engines reduce to: forces at step n see the positions of step n and the velocities of the
-half step before; so the same contact gives the same numbers in all three to round-off.
+The integrator is the leapfrog that the engines reduce to: forces at step n see the positions of step n and the velocities of the
+half step before; so the same contact gives the same numbers in all of them to round-off.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Prescribed motion of walls: what LIGGGHTS and YADE move walls by."""
+"""Prescribed motion of walls: what the engines move walls by."""
 
 from __future__ import annotations
 

@@ -105,6 +105,8 @@ def test_tables_hold_every_run_and_quantity(results: Path) -> None:
 
 def test_export(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(results / "box/n=1/yade/metrics.json", Result("box", "n=1", "yade", CHECKS))
+    assert main(["export", str(results), "--table", "comparisons"]) == 2
+    assert f"no comparisons in {results}" in capsys.readouterr().err
     assert main(["export", str(results)]) == 0
     assert capsys.readouterr().out.splitlines()[1].startswith("box,n=1,yade,")
     assert main(["export", str(results), "--table", "runs", "--out", str(tmp_path / "runs.json")]) == 0
