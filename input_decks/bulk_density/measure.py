@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from dembark.input_decks.common.estimates import over_chaotic, ratio
+from dembark.input_decks.common.momentum import unaccounted
 from dembark.input_decks.oedometer.measure import FRACTIONS
 from dembark.postproc.measurement import Array, Estimate, Measurement, Replica, Replicas, Value, exact, profile
 from dembark.postproc.replica import cached_per_replica
@@ -29,12 +32,9 @@ def fractions(replica: Replica) -> Array:
 
 def impulse_error(replica: Replica) -> float:
     """From frame to frame: impulse of the plate less that of the weight and what the grains gain, over that of the weight; the largest."""
-    rows, frames = replica.times(), list(replica.grains())
-    steps = np.array([frame.step for frame in frames])
-    gained = np.diff([frame.masses @ frame.velocities[:, 2] for frame in frames])
-    pushed = np.diff(rows["plate_jz"][np.searchsorted(rows["step"], steps)])
-    weight = frames[0].masses.sum() * replica.parameters["gravity"] * np.diff(steps) * replica.time_step
-    return float(np.abs(pushed / weight - 1.0 - gained / weight).max())
+    rows, gravity, dt = replica.times(), replica.parameters["gravity"], replica.time_step
+    return max(abs(unaccounted(one, other, rows, ["plate"], "z", -gravity, dt)) / (
+        float(one.masses.sum()) * gravity * (other.step - one.step) * dt) for one, other in pairwise(replica.grains()))
 
 
 def measure(replicas: Replicas) -> Measurement:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array
 
 # Parts of the contact forces in the energy account: of dry contacts without rolling resistance, and all.
@@ -35,6 +36,16 @@ def left_to(rows: Rows, wall: str, axis: str, time_step: float, weight: float, s
     others = sum(float(impulses(rows, one, axis, time_step)[since:].sum()) for one in walls_of(rows) if one != wall)
     duration = time_step * float(rows["step"][-1] - rows["step"][since])
     return float(momentum[-1] - momentum[since]) - weight * duration - others
+
+
+def unaccounted(first: GrainFrame, last: GrainFrame, rows: Rows, walls: Sequence[str], axis: str, gravity: float,
+                time_step: float) -> float:
+    """N s, along an axis: what the grains gained from one frame to another, less the impulses of their weight by `gravity` (m/s², along the
+    axis) and of the `walls`, from the columns <wall>_j<axis> (N s), which count every step."""
+    start, end = np.searchsorted(rows["step"], [first.step, last.step])
+    pushed = sum(float(rows[f"{wall}_j{axis}"][end] - rows[f"{wall}_j{axis}"][start]) for wall in walls)
+    before, after = (float(frame.masses @ frame.velocities[:, "xyz".index(axis)]) for frame in (first, last))
+    return after - before - pushed - float(last.masses.sum()) * gravity * (last.step - first.step) * time_step
 
 
 def imbalance(rows: Rows, parts: Sequence[str] = PARTS) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 
 from dembark.input_decks.common.estimates import over_chaotic, reference_rows
 from dembark.input_decks.common.heaps import at_rest, height
+from dembark.input_decks.common.momentum import unaccounted
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array, Estimate, Measurement, Replica, Replicas, Value, exact, profile
 from dembark.postproc.replica import cached_per_replica
@@ -103,11 +104,8 @@ def balances(replica: Replica) -> tuple[float, float]:
     rows, (first, before, last) = replica.times(), ends(replica)
     weight = last.masses.sum() * replica.parameters["gravity"]
     force = rows["pan_fz"][rows["step"] > before.step].mean()
-    gained = last.masses @ last.velocities[:, 2] - first.masses @ first.velocities[:, 2]
-    start, end = np.searchsorted(rows["step"], [first.step, last.step])
-    pushed = sum(rows[name][end] - rows[name][start] for name in ("pan_jz", "cylinder_jz"))
-    passed = weight * (last.step - first.step) * replica.time_step
-    return float(force / weight - 1.0), float((pushed - gained) / passed - 1.0)
+    missing = unaccounted(first, last, rows, ["pan", "cylinder"], "z", -replica.parameters["gravity"], replica.time_step)
+    return float(force / weight - 1.0), missing / (weight * (last.step - first.step) * replica.time_step)
 
 
 def measure(replicas: Replicas) -> Measurement:

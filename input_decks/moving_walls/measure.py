@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.optimize import brentq
 
+from dembark.input_decks.common.momentum import unaccounted
 from dembark.input_decks.common.motion import amplitude, motion
 from dembark.physics import effective_youngs_modulus
 from dembark.postproc.measurement import Array, Curve, Measurement, Points, Replica, Replicas, Value, exact, profile
@@ -133,11 +134,9 @@ def _bed(run: Replica) -> tuple[dict[str, float], list[Curve]]:
     frames, rows = list(run.grains()), run.times()
     masses = frames[0].masses
     gravity = np.array([run.derived[f"gravity_{axis}"] for axis in "xyz"])
-    momentum = [np.einsum("n,na->a", masses, frame.velocities) for frame in (frames[0], frames[-1])]
-    begun = int(np.flatnonzero(rows["step"] == frames[0].step)[0])
-    impulse = np.array([rows[f"plate_j{axis}"][-1] - rows[f"plate_j{axis}"][begun] for axis in "xyz"])
     weight, lasts = masses.sum() * np.linalg.norm(gravity), times[-1] - times[0]
-    missing = impulse + masses.sum() * gravity * lasts - (momentum[1] - momentum[0])
+    missing = [unaccounted(frames[0], frames[-1], rows, ["plate"], axis, own, run.time_step)
+               for axis, own in zip("xyz", gravity, strict=True)]
     push = (forces - masses[:, None] * gravity).ravel()
     label = "index: by frame, grain and component"
     return {"impulse_error": float(np.linalg.norm(missing) / (weight * lasts))}, [
