@@ -16,7 +16,7 @@ from dembark.validation.case.model import Case
 # Below these numbers most checks have nothing to average over.
 _FEW_GRAINS = 100
 _FEW_FRAMES = 4
-_MISTAKES = (NameError, AttributeError, ImportError, TypeError, KeyError)
+_MISTAKES = (NameError, AttributeError, ImportError, TypeError, KeyError, OSError)
 
 
 @contextmanager

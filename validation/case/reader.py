@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -240,15 +241,13 @@ class CaseReader(TableReader):
             raise self.fail(table, f"unknown unit {found.unit!r}", 'an SI unit, d or R, or "1"')
         if found.tolerance is not None and not found.evidence:
             raise self.fail(table, "a tolerance without evidence", f"say what the reference is: {', '.join(EVIDENCE)}")
-        if isinstance(found.tolerance, str):
-            if found.tolerance != "bound":
-                raise self.fail(table, f"tolerance = {found.tolerance!r} is unknown", 'give a number >= 0, or "bound"')
-        elif found.tolerance is not None and not found.tolerance >= 0:
-            raise self.fail(table, f"tolerance = {found.tolerance!r} is negative", 'give a number >= 0, or "bound"')
-        elif found.tolerance and not found.why:
+        for key, word, advice in (("tolerance", "bound", ', or "bound"'), ("input_uncertainty", None, ""), ("agreement", None, "")):
+            value = getattr(found, key)
+            # An infinite one would allow anything.
+            if value is not None and value != word and (isinstance(value, str) or not 0.0 <= value < math.inf):
+                raise self.fail(table, f"{key} = {value!r} is not possible", f"give a finite number >= 0{advice}")
+        if found.tolerance and found.tolerance != "bound" and not found.why:
             raise self.fail(table, "a tolerance without why", "say where the deviation that it allows comes from")
-        if not found.input_uncertainty >= 0.0:
-            raise self.fail(table, f"input_uncertainty = {found.input_uncertainty!r} is negative", "give a number >= 0")
         if found.input_uncertainty and not (found.inputs and isinstance(found.tolerance, float)):
             raise self.fail(table, "input_uncertainty needs inputs and a tolerance that is a number", "say which inputs were changed")
         if found.input_uncertainty and found.input_uncertainty >= float(found.tolerance or 0.0):

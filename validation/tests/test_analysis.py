@@ -61,7 +61,8 @@ def test_an_error_in_a_measurement_is_told_with_its_line(tmp_path: Path) -> None
     # Grains more or fewer do not mend a mistake.
     run = Replica(tmp_path, {"parameters": {"gravity": 9.81}})
     for code, kind, line in (("foo", NameError, "NameError: name 'foo' is not defined"), (
-            "replicas[0].parameters['gravty']", KeyError, "KeyError: 'there is no parameter gravty, did you mean gravity?'")):
+            "replicas[0].parameters['gravty']", KeyError, "KeyError: 'there is no parameter gravty, did you mean gravity?'"), (
+            "open('film.csv')", FileNotFoundError, "FileNotFoundError: [Errno 2] No such file or directory: 'film.csv'")):
         (tmp_path / "measure.py").write_text(f"def measure(replicas):\n    return {code}\n\ndef study(name, points, along):\n    pass\n")
         with pytest.raises(kind) as caught:
             measurement.measure(case, [run])
