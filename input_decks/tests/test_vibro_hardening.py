@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -28,7 +27,7 @@ from dembark.input_decks.common.part_impacts import (
 )
 from dembark.input_decks.common.part_noise import Noise, octave_curves
 from dembark.input_decks.common.trough import polygon, prism
-from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, octave_left_out, point
 from dembark.input_decks.tests.synthetic_bed import PERIOD, PERIODS, trough
 from dembark.input_decks.tests.test_vibro_finishing import account
 from dembark.input_decks.vibro_hardening.throws import angles
@@ -316,21 +315,6 @@ def test_grains_hammer_the_part_and_nothing_is_missed(engine: str, changes: Any,
     assert found["friction_power"]["value"] > 0.0
 
 
-def octave_control(folder: Path) -> Control:
-    """The same record with all bands, and without the last of them."""
-    right = measured(folder)
-    with pytest.MonkeyPatch.context() as patch:
-        part_noise = sys.modules[Noise.__module__]
-        both = part_noise.mean_squares
-
-        def without_the_last(*given: Any) -> Any:
-            bands, squares = both(*given)
-            return type(bands)(bands.numbers[:-1]), squares[:-1]
-
-        patch.setattr(part_noise, "mean_squares", without_the_last)
-        return Control("a third octave that is left out", right, measured(folder))
-
-
 def controls_vibro_hardening(folder: Path) -> Iterator[Control]:
     folder.mkdir(exist_ok=True)
     right = measured(folder / "right")
@@ -339,6 +323,6 @@ def controls_vibro_hardening(folder: Path) -> Iterator[Control]:
     yield Control("impacts of half the mass", right, measured(folder / "half", lighter=0.5))
     yield Control("impacts of half the mass", thrown(folder / "thrown"), thrown(folder / "lighter", heavier=0.5))
     yield Control("angles from the normal", thrown(folder / "thrown"), thrown(folder / "turned", turned=True))
-    yield octave_control(folder / "octaves")
+    yield octave_left_out(lambda: measured(folder / "octaves"))
     yield Control("a bed that is calmer at 10 mm than at 2 mm", amplitude_study(1.0, 3.0), amplitude_study(1.0, 0.8))
     yield Control("impacts that grow with every halving of the step", step_study(0.01, 0.0101, 0.0102), step_study(0.01, 0.012, 0.014))

@@ -67,7 +67,7 @@ def measure(replicas: Replicas) -> Measurement:
         "stirring": over([one.fluctuation_ratio() for one in runs]), "agitation": over([one.agitation() for one in runs]),
     }
     curves = [vibratory_trough.drifts(runs), vibratory_trough.spectra(runs, "trough"), *hits.profiles]
-    return Measurement(values | hits.values, curves, surface=hits.surface)
+    return Measurement({**values, **hits.values}, curves, surface=hits.surface)
 
 
 def thrown(records: list[RubbedRecord], p: Numbers) -> Measurement:
