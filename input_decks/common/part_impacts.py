@@ -82,7 +82,7 @@ class ContactRecord:
         return block_mean(self._by_period(every, self.begins) / self.period)
 
     def energies(self) -> Array:
-        """Energies (impacts,) in J of the normal motion, m v^2 / 2: the part is far heavier than a grain."""
+        """Energies (impacts,) in J of the normal motion against the part, m v^2 / 2."""
         chosen = self.begins
         return np.asarray(0.5 * self.masses[chosen] * self.closing[chosen] ** 2)
 

@@ -43,7 +43,9 @@ def measure(replicas: Replicas) -> Measurement:
         worst = max((one.likeness() for one in runs), key=abs)
         values["likeness"] = Value(exact(worst), exact(0.0))
     records = [contact_record(one) for one in replicas]
-    if p["static_friction"] == 0.0:
+    # The record has neither friction between grains and part nor bridges.
+    friction = p["grain_friction"] if p["static_friction"] is None else p["static_friction"]
+    if friction == 0.0 and p["bridge_volume"] == 0.0:
         values["touch_balance"] = Value(exact(max(one.gap for one in records)), exact(0.0))
     hits = impact_measurement(records, part_surface(replicas[0]), p, runs[0].speed)
     return Measurement({**values, **hits.values}, [drifts(runs), spectra(runs, "trough"), *hits.profiles], surface=hits.surface)
