@@ -11,6 +11,8 @@ from .setup import Parameters, time_step
 PHASES = 8
 # How far grains may give way in an impact at the highest speed of the wall, over d; steps that such an impact has to last.
 DEEPEST, SHORTEST = 0.02, 25
+# Samples of the grains on a part in an impact at that speed.
+SAMPLES = 12
 
 
 def highest_speed(p: Parameters) -> float:
@@ -38,6 +40,12 @@ def suitable_step(p: Parameters, speed: float) -> float:
         raise DembarkError(f"an impact at the wall's highest speed, {speed:.3g} m/s, lasts {lasts / time_step(p):.3g} steps",
                            f"lower time_step_fraction until it lasts {SHORTEST}")
     return time_step(p)
+
+
+def sample_stride(p: Parameters, speed: float, step: float) -> int:
+    """Steps of `step` (s) from one sample of the grains on a part to the next: twelve in an impact at `speed` (m/s)."""
+    _, lasts = impact(p, speed)
+    return max(1, int(lasts / (SAMPLES * step)))
 
 
 def fixed_phases(frequency: float, time_step: float, start: float, periods: int, rows: int = 16) -> tuple[float, dict[str, int]]:

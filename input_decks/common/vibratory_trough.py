@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replica, Value, block_mean, exact, profile
@@ -18,6 +18,9 @@ from dembark.postproc.studies import measured
 
 from .drive_phases import Phases, cell_means, read_phases
 from .vibration import PHASES
+
+# Complex numbers.
+Plane = NDArray[np.complex128]
 
 # Width of the cells of the velocity field, in mean diameters.
 CELL = 4.0
@@ -181,27 +184,39 @@ def spectrum(forces: Array, periods: int) -> tuple[Array, Array]:
     return np.arange(len(amplitudes)) / periods, sides * (np.abs(amplitudes) ** 2).sum(axis=1) / count**2
 
 
+def body_motion(places: Plane, speeds: Plane, numbers: Mapping[str, float]) -> tuple[Plane, Plane, Plane, Array]:
+    """Centre of mass (...,) in m, turn (...,) as a number of size 1, velocity (...,) in m/s, and spin (...,) in rad/s of a rigid body, from
+    the `places` (..., spheres) and `speeds` of its spheres, or only of the first and the last, which were at (`first_x`, `first_z`) and
+    (`last_x`, `last_z`) (m) from the centre before it turned. Of complex numbers z + i x, whose angle grows from z to x."""
+    first, last = (complex(numbers[f"{which}_z"], numbers[f"{which}_x"]) for which in ("first", "last"))
+    turned = (places[..., -1] - places[..., 0]) / (last - first)
+    turned = turned / np.abs(turned)
+    centre = places[..., 0] - turned * first
+    middle, mean = places.mean(axis=-1), speeds.mean(axis=-1)
+    arm, way = places - middle[..., None], speeds - mean[..., None]
+    spin = (np.conj(arm) * way).imag.sum(axis=-1) / (np.abs(arm) ** 2).sum(axis=-1)
+    return centre, turned, mean + 1j * spin * (centre - middle), spin
+
+
+def in_plane(vectors: Array) -> Plane:
+    """Numbers z + i x (...,) of `vectors` (..., 3)."""
+    return np.asarray(vectors[..., 2] + 1j * vectors[..., 0])
+
+
 def joined(frame: GrainFrame, numbers: Mapping[str, float]) -> GrainFrame:
-    """A frame whose last `body_spheres` grains, the spheres of a rigid body, are one grain with its mass `body_mass` (kg): at the centre of
-    mass, from which the first and the last sphere were at (`first_x`, `first_z`) and (`last_x`, `last_z`) (m) before it turned."""
+    """A frame whose last `body_spheres` grains, the spheres of a rigid body, are one grain with its mass `body_mass` (kg), at the centre of
+    mass; see `body_motion`."""
     begin = len(frame.ids) - int(numbers["body_spheres"])
     kept = frame.select(np.arange(len(frame.ids)) <= begin)
-    places, speeds = (values[begin:][:, [0, 2]] for values in (frame.positions, frame.velocities))
-    # Of complex numbers z + i x, whose angle grows from z to x.
-    first, last = (complex(numbers[f"{which}_z"], numbers[f"{which}_x"]) for which in ("first", "last"))
-    place, speed = (values[:, 1] + 1j * values[:, 0] for values in (places, speeds))
-    turned = (place[-1] - place[0]) / (last - first)
-    centre = place[0] - turned / abs(turned) * first
-    arm, way = place - place.mean(), speed - speed.mean()
-    spin = float((np.conj(arm) * way).imag.sum() / (np.abs(arm) ** 2).sum())
-    velocity = speed.mean() + 1j * spin * (centre - place.mean())
+    centre, _, velocity, spin = body_motion(in_plane(frame.positions[begin:]), in_plane(frame.velocities[begin:]), numbers)
 
     def ending(values: Array, last: ArrayLike) -> Array:
         return np.concatenate([values[:-1], [last]])
 
-    positions = ending(kept.positions, [centre.imag, 0.0, centre.real])
+    positions = ending(kept.positions, [float(centre.imag), 0.0, float(centre.real)])
     return replace(kept, positions=positions, wrapped=positions, masses=ending(kept.masses, numbers["body_mass"]),
-                   velocities=ending(kept.velocities, [velocity.imag, 0.0, velocity.real]), omegas=ending(kept.omegas, [0.0, spin, 0.0]))
+                   velocities=ending(kept.velocities, [float(velocity.imag), 0.0, float(velocity.real)]),
+                   omegas=ending(kept.omegas, [0.0, float(spin), 0.0]))
 
 
 def rigidity(frames: Sequence[GrainFrame], spheres: int) -> float:

@@ -21,6 +21,8 @@ MEASURED = Path(__file__).with_name("reference") / "fronts.csv"
 NAMES = {"martin_moyce": "Martin & Moyce (1952)", "koshizuka_oka": "Koshizuka & Oka (1996)"}
 # T from which points count, and the fewest with which a line is fitted.
 FREE, FEWEST = 1.0, 4
+# Area over a² of the water ahead of a front whose place the spacing does not decide: the tip of the water is as thin as one particle.
+AHEAD = 0.01
 NOWHERE = Estimate(math.nan, math.inf, "the front does not get so far")
 
 
@@ -33,9 +35,19 @@ def published(source: str) -> tuple[Array, Array]:
 @cached_per_replica
 def front(run: Replica) -> tuple[Array, Array]:
     """Times T = t √(2g/a) and places over a of the front: the foremost particle and half a spacing."""
+    return _places(run, 1)
+
+
+def thick_front(run: Replica) -> tuple[Array, Array]:
+    """The same of the particle that has AHEAD a² of water before it, where the water is thicker than a particle."""
+    return _places(run, max(round(AHEAD * run.parameters["resolution"] ** 2), 1))
+
+
+def _places(run: Replica, number: int) -> tuple[Array, Array]:
+    """Times T and places over a of the particle that is the `number`-th from the front, and half a spacing."""
     p = run.parameters
     width, unit = p["column_width"], math.sqrt(p["column_width"] / (2.0 * p["gravity"]))
-    frames = [(frame.step * run.time_step / unit, (frame.positions[:, 0].max() + 0.5 * width / p["resolution"]) / width)
+    frames = [(frame.step * run.time_step / unit, (np.sort(frame.positions[:, 0])[-number] + 0.5 * width / p["resolution"]) / width)
               for frame in run.grains()]
     times, places = np.array([(0.0, 1.0), *frames]).T
     return times, places
@@ -69,7 +81,9 @@ def measure(replicas: Replicas) -> Measurement:
     run = replicas[0]
     own, p = front(run), run.parameters
     energy = p["fluid_density"] * p["gravity"] * 2.0 * p["column_width"] ** 3
-    values = {"front_at_3": Value(exact(float(np.interp(3.0, *own)))), **common_values(run, energy)}
+    thick = thick_front(run)
+    values = {"front_at_3": Value(exact(float(np.interp(3.0, *own)))), "thick_front_at_3": Value(exact(float(np.interp(3.0, *thick)))),
+              "thick_speed": Value(pace(thick, "martin_moyce")[0]), **common_values(run, energy)}
     for source in NAMES:
         found = pace(own, source)
         references = due(source, found) if p["no_slip"] == "yes" else (None, None)

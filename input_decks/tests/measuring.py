@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
+import pytest
 
+from dembark.input_decks.common import part_noise
 from dembark.input_decks.common.liquid import liquid_values
 from dembark.input_decks.common.log_run import LogRun, read
 from dembark.postproc.measurement import Measurement
@@ -73,6 +75,19 @@ def dried(case: str) -> Control:
         return judged(case, Measurement(liquid_values([run])))
 
     return Control("liquid that dries up", of_run(1.0), of_run(0.999))
+
+
+def octave_left_out(measured: Callable[[], Verdicts]) -> Control:
+    """What is `measured` of the same impacts on a part with all third octaves, and without the last of them."""
+    right, both = measured(), part_noise.mean_squares
+
+    def without_the_last(*given: Any) -> Any:
+        bands, squares = both(*given)
+        return type(bands)(bands.numbers[:-1]), squares[:-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(part_noise, "mean_squares", without_the_last)
+        return Control("a third octave that is left out", right, measured())
 
 
 def compared(folder: Path) -> dict[str, dict[str, Any]]:

@@ -88,6 +88,19 @@ def test_a_front_that_does_not_get_there_fails() -> None:
     assert {"speed_martin_moyce", "delay_martin_moyce"} <= names(study(faster=0.3), "fail")
 
 
+@pytest.mark.parametrize("number", [20, 40, 80])
+def test_a_thin_tip_moves_the_foremost_particle_and_not_the_front_behind_it(number: int) -> None:
+    """Water whose depth is (2 − x/a)² a, so that x/a = 2 − (3 · 0.01)^(1/3) has a hundredth of a² before it. Particles are as thin."""
+    spacing = A / number
+    across = (np.arange(2 * number) + 0.5) / number
+    x = np.concatenate([np.full(round((2.0 - place) ** 2 * number), place * A) for place in across])
+    still = frame_of(np.stack([x, 0.0 * x, 0.0 * x], axis=1), 0.5 * spacing, {}, step=100)
+    wedge = SimpleNamespace(parameters=defaults("dam_break") | {"resolution": number}, time_step=DT, grains=lambda: [still])
+    assert dam.thick_front(wedge)[1][-1] == pytest.approx(2.0 - 0.03 ** (1.0 / 3.0), abs=1.5 / number)
+    # A column half a particle high is the last that has one.
+    assert dam.front(wedge)[1][-1] == pytest.approx(2.0 - math.sqrt(0.5 / number), abs=1.0 / number)
+
+
 def test_a_run_without_spacings_to_study_is_judged_by_itself() -> None:
     alone = run(faster=8.0 / 7.0)
     alone.parameters["no_slip"] = "yes"

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dembark.input_decks.common.water_run import pressure
+from dembark.input_decks.dam_break_box import plane
 from dembark.input_decks.dam_break_box.sensors import GAUGES
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names
 from dembark.postproc import GrainsDump, read_times
@@ -250,3 +251,20 @@ def controls_dam_break_box(_folder: Path) -> Iterator[Control]:
     yield Control("water that arrives a tenth late", of_spacings, study(late=1.1))
     yield Control("a sensor that shows three quarters of the pressure", of_spacings, study(weak=0.75))
     yield Control("levels a sixth of the largest too high", of_spacings, study(high=0.1))
+
+
+def test_theory_of_the_face_is_kirchhoffs_in_deep_water_and_keeps_momentum() -> None:
+    """A plate in a stream without surface: y/b = (s + ½ (s √(1 − s²) + asin s))/(1 + π/4) where u/U = (1 − √(1 − s²))/s."""
+    s = np.linspace(0.05, 0.99, 20)
+    heights = (s + 0.5 * (s * np.sqrt(1.0 - s**2) + np.arcsin(s))) / (1.0 + 0.25 * math.pi)
+    assert np.interp(heights, *plane.turned(100.0, 1.0)[1:]) == pytest.approx(1.0 - ((1.0 - np.sqrt(1.0 - s**2)) / s) ** 2, abs=5e-3)
+    for depth in (0.3, 1.0, 10.0):
+        angle, place, slow = plane.turned(depth, 1.0)
+        assert 0.5 * np.trapezoid(slow, place) == pytest.approx(depth * (1.0 - math.cos(angle)), rel=1e-3)
+
+
+def test_pressures_on_the_face_in_the_plane_are_those_of_theory_away_from_the_edge() -> None:
+    found, depth = plane.simulated(20)
+    theory = plane.expected(found[0], depth)
+    assert theory[0] == pytest.approx(found[0], rel=1e-12)
+    assert found[1] == pytest.approx(theory[1], rel=0.12) and found[3] < 0.9 * theory[3]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,12 +16,16 @@ from scipy.interpolate import CubicSpline
 
 from dembark.common.errors import DembarkError
 from dembark.input_decks.common.momentum import CONTACT_PARTS
+from dembark.input_decks.common.part_impacts import own_modulus
 from dembark.input_decks.common.trough import sites_within
 from dembark.input_decks.common.trough import trough as trough_mesh
 from dembark.input_decks.common.vibratory_trough import Trough, joined, read
-from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, octave_left_out, point
 from dembark.input_decks.tests.synthetic_bed import trough
+from dembark.input_decks.tests.synthetic_part import BALL, COUNT, DUMBBELL, MASS, PART_MASS, PART_MOMENT, RADIUS, SLIP, SPEED, SURFACE
+from dembark.input_decks.tests.synthetic_part import hits as hits_on_part
 from dembark.input_decks.vibro_finishing.free_body import FreeBody, free_body
+from dembark.input_decks.vibro_finishing.touches import FreeRecord
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.packings import frame_of
 from dembark.postproc.walls.mesh import cut, read_stl
@@ -29,6 +34,7 @@ from dembark.validation.case.folders import find, load
 from dembark.validation.case.resolve import resolve
 
 finishing = module("vibro_finishing")
+hits_of_ball = cache(lambda lost=0: hits_on_part(BALL, lost=lost).record)
 GRAIN = {"part_diameter": 0.005, "part_density": 2500.0}
 
 
@@ -40,9 +46,14 @@ def account(rows: dict[str, Any], booked: float = 1.0) -> dict[str, Any]:
     return rows | table
 
 
-def measured(run: Trough, booked: float = 1.0, **parameters: Any) -> dict[str, Any]:
+def with_hits(run: Trough, hits: FreeRecord) -> dict[Any, Any]:
+    """What a replica has read of both."""
+    return {read.__wrapped__: run, finishing.contact_record.__wrapped__: hits, finishing.part_surface.__wrapped__: SURFACE}
+
+
+def measured(run: Trough, booked: float = 1.0, hits: FreeRecord | None = None, **parameters: Any) -> dict[str, Any]:
     replica = Replica(Path(), {"parameters": defaults("vibro_finishing", motion_frequency=12.5, **parameters)})
-    replica.__dict__["_read"] = {read.__wrapped__: replace(run, rows=account(dict(run.rows), booked))}
+    replica.__dict__["_read"] = with_hits(replace(run, rows=account(dict(run.rows), booked)), hits or hits_of_ball())
     return judged("vibro_finishing", finishing.measure([replica]))
 
 
@@ -51,7 +62,7 @@ def measured_body(folder: Path, weight: float = 1.0, noise: float = 0.0) -> dict
     run = trough(folder, noise=noise)
     replica = Replica(folder, {"parameters": defaults("vibro_finishing", motion_frequency=12.5, part="cylinder"),
                                "derived": {"body_spheres": 3}})
-    replica.__dict__["_read"] = {read.__wrapped__: replace(run, weight=weight * run.weight)}
+    replica.__dict__["_read"] = with_hits(replace(run, weight=weight * run.weight), hits_of_ball())
     return judged("vibro_finishing", finishing.measure([replica]))
 
 
@@ -70,7 +81,7 @@ def points(along: str, *pairs: tuple[float, float]) -> list[dict[str, Any]]:
 
 def test_a_bed_that_turns_as_a_body(tmp_path: Path) -> None:
     found = measured(trough(tmp_path, noise=5e-5), **GRAIN)
-    assert names(found, "pass") == {"energy_balance", "momentum_balance", "likeness"}
+    assert names(found, "pass") == {"energy_balance", "momentum_balance", "likeness", "octave_sum"}
     omega = 2.0 * np.pi * 12.5
     assert found["circulation"]["value"] == pytest.approx(0.5 / omega, rel=0.05)
     assert found["revolution"]["value"] == pytest.approx(0.5 / omega, rel=0.1)
@@ -82,22 +93,49 @@ def test_a_large_part_is_not_taken_for_a_grain(tmp_path: Path) -> None:
 
 
 SMALL = {"grain_count": 60, "trough_width": 0.08, "part_diameter": 0.02, "strips": 12, "motion_ramp": 1, "settle_time": 0.1, "periods": 8}
+# So much of what moves the part is recorded.
+SMOOTH = {"static_friction": 0.0}
 
 
 @pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 def test_the_trough_shakes_bed_and_part_in_their_plane(engine: str, simulate: Any) -> None:
-    run = simulate("vibro_finishing", engine, SMALL)
+    run = simulate("vibro_finishing", engine, SMALL | SMOOTH)
     found = judged("vibro_finishing", finishing.measure([run]))
-    assert "energy_balance" in names(found, "pass"), found
+    assert {"energy_balance", "touch_balance"} <= names(found, "pass") and found["impact_rate"]["value"] > 10.0, found
     frames = list(run.grains())
     assert all((frame.positions[:, 1] == 0.0).all() and np.hypot(*frame.positions[:, [0, 2]].T).max() < 0.05 for frame in frames)
     assert frames[0].radii[-1] == pytest.approx(0.01) and len(frames[0].ids) == 61
     assert 0.001 < found["power"]["value"] < 1.5 and found["noise"]["value"] > 0.0
 
 
+@pytest.mark.parametrize("shape", [BALL, DUMBBELL])
+def test_impacts_on_a_part_that_falls_and_turns_are_known(shape: Any) -> None:
+    record, spheres, normals = hits_on_part(shape)
+    chosen = record.begins
+    assert chosen.sum() == COUNT and abs(record.gap) < 0.01 and hits_on_part(shape, lost=1).record.gap > 0.05
+    # Until the first sample, up to a twelfth of an impact is over.
+    speeds, angle = record.paths()
+    closing, slip = speeds * np.sin(angle), speeds * np.cos(angle)
+    assert (closing < 1.001 * SPEED).all() and (closing > 0.87 * SPEED).all() and closing.max() > 0.99 * SPEED
+    np.testing.assert_allclose(slip, SLIP, rtol=0.05)
+    # Where on the part, as it was before it turned.
+    places, radius = shape
+    touch = places[spheres] + radius * normals
+    np.testing.assert_allclose(record.points[chosen], np.column_stack([touch.imag, 0.0 * speeds, touch.real]), atol=1e-5)
+    lever = np.cross(record.points[chosen], record.normals[chosen])[:, 1]
+    np.testing.assert_allclose(record.masses[chosen], 1.0 / (1.0 / MASS + 1.0 / PART_MASS + lever**2 / PART_MOMENT))
+    assert (np.abs(lever).max() > 0.005) == (len(places) > 1)
+    reduced = 1.0 / (1.0 / RADIUS + 1.0 / radius)
+    np.testing.assert_allclose(record.run_radii, reduced)
+    np.testing.assert_allclose(record.radii, reduced if len(places) == 1 else RADIUS)
+    # The forces are those of single grains, of which a sample may miss the peak, and the first one some speed.
+    alone, _ = record.shadows(record.run_radii, own_modulus(defaults("vibro_finishing")), 0.5)
+    np.testing.assert_allclose(record.peaks(), alone, rtol=0.1)
+
+
 def test_momentum_balances_and_a_body_stays_rigid(tmp_path: Path) -> None:
     found = measured_body(tmp_path)
-    assert names(found, "pass") == {"momentum_balance", "rigidity"} and "energy_balance" not in found
+    assert names(found, "pass") == {"momentum_balance", "rigidity", "octave_sum"} and "energy_balance" not in found
 
 
 def part(**changes: Any) -> FreeBody:
@@ -149,9 +187,11 @@ def test_spheres_of_a_body_are_one_part(turn: float) -> None:
 @pytest.mark.parametrize("engine", ["liggghts", "yade", "lammps"])
 @pytest.mark.parametrize("part", ["cylinder", "file"])
 def test_the_part_is_a_body_of_spheres(part: str, engine: str, simulate: Any) -> None:
-    run = simulate("vibro_finishing", engine, {**SMALL, "trough_width": 0.1, "part": part, "part_density": 2500.0})
+    smooth = SMOOTH if part == "file" else {}
+    run = simulate("vibro_finishing", engine, {**SMALL, **smooth, "trough_width": 0.1, "part": part, "part_density": 2500.0})
     found = judged("vibro_finishing", finishing.measure([run]))
-    assert {"momentum_balance", "rigidity"} <= names(found, "pass") and "energy_balance" not in found, found
+    due = {"momentum_balance", "rigidity", "octave_sum"} | ({"touch_balance"} if smooth else set())
+    assert names(found, "pass") == due and "energy_balance" not in found, found
     places = np.array([frame.positions for frame in run.grains()])
     assert places.shape[1] == 60 + run.derived["body_spheres"]
     assert np.abs(places[..., 1]).max() < 1e-11 and np.hypot(places[..., 0], places[..., 2]).max() < 0.06
@@ -262,6 +302,9 @@ def controls_vibro_finishing(folder: Path) -> Iterator[Control]:
     yield Control("a hundredth of the damping that is not booked", right, measured(run, 0.99, **GRAIN))
     yield Control("a body whose weight is counted for each of two spheres", measured_body(folder), measured_body(folder, weight=1.1))
     yield Control("a sphere that leaves its body", measured_body(folder), measured_body(folder, noise=5e-5))
+    smooth = {"static_friction": 0.0, **GRAIN}
+    yield Control("a tenth of the touches lost", measured(run, **smooth), measured(run, hits=hits_of_ball(1), **smooth))
+    yield octave_left_out(lambda: measured(run, **GRAIN))
     yield Control("a part that is held", right, measured(trough(folder, noise=5e-5, still=True), **GRAIN))
     yield Control("a bed that turns the same way whatever the drive", sense_study(), sense_study(0.01, 0.01, 0.01))
     yield Control("a bed that turns faster with every halving of the step",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -17,21 +16,22 @@ import pytest
 from dembark.common.errors import DembarkError
 from dembark.input_decks.common import vibratory_trough
 from dembark.input_decks.common.bodies import read_body
-from dembark.input_decks.common.trough import polygon, prism
-from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
-from dembark.input_decks.tests.synthetic_bed import PERIOD, PERIODS, trough
-from dembark.input_decks.tests.test_vibro_finishing import account
-from dembark.input_decks.vibro_hardening.part_impacts import (
-    ContactRecord,
+from dembark.input_decks.common.part_impacts import (
     lone_impacts,
     mean_pressures,
     nearest,
     outline,
-    read_record,
+    own_modulus,
     strips,
     surface_map,
 )
+from dembark.input_decks.common.part_noise import Noise, octave_curves
+from dembark.input_decks.common.trough import polygon, prism
+from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, octave_left_out, point
+from dembark.input_decks.tests.synthetic_bed import PERIOD, PERIODS, trough
+from dembark.input_decks.tests.test_vibro_finishing import account
 from dembark.input_decks.vibro_hardening.throws import angles
+from dembark.input_decks.vibro_hardening.touches import RubbedRecord, read_record
 from dembark.postproc.replica import Replica
 from dembark.postproc.tests.dumps import grains_text
 from dembark.postproc.third_octaves import half_sine
@@ -57,7 +57,7 @@ def moving() -> Any:
                            velocity=lambda t: np.ones((len(t), 1)) * [0.0, 0.0, 0.1])
 
 
-def record(folder: Path, count: int = 60, lost: int = 0, part: MeshWall = SQUARE) -> ContactRecord:
+def record(folder: Path, count: int = 60, lost: int = 0, part: MeshWall = SQUARE) -> RubbedRecord:
     """`count` impacts on the upper side of a part, one after the other, each of a half sine of force; grains alternate. Of `lost` impacts
     nothing was recorded."""
     top, text = part.triangles[..., 2].max(), []
@@ -76,12 +76,12 @@ def record(folder: Path, count: int = 60, lost: int = 0, part: MeshWall = SQUARE
     return read_record(path, moving(), part, stride=STRIDE, time_step=STEP, first=0, periods=PERIODS, period=PERIOD, depth=DEPTH)
 
 
-def throws(folder: Path, *, turned: bool = False, heavier: float = 1.0) -> list[ContactRecord]:
+def throws(folder: Path, *, turned: bool = False, heavier: float = 1.0) -> list[RubbedRecord]:
     """Six grains that meet the upper side of a square part at known angles, or at these from the normal; the forces are those of `heavier`
     grains."""
     top, speed, p = SQUARE.triangles[..., 2].max(), 1.0, defaults("vibro_hardening")
     angle = 0.5 * np.pi - angles(6) if turned else angles(6)
-    forces, _ = lone_impacts(np.full(6, heavier * MASS), np.full(6, RADIUS), speed * np.sin(angles(6)), hardening.own_modulus(p),
+    forces, _ = lone_impacts(np.full(6, heavier * MASS), np.full(6, RADIUS), speed * np.sin(angles(6)), own_modulus(p),
                              p["restitution"])
     zero, still = np.zeros(6), SimpleNamespace(displacement=lambda t: np.zeros((len(t), 3)), velocity=lambda t: np.zeros((len(t), 3)))
     places = np.column_stack([0.0065 * (np.arange(6) - 2.5) / 2.0, zero, np.full(6, top + RADIUS * (1.0 - 1e-6))])
@@ -109,7 +109,7 @@ def measured(folder: Path, booked: float = 1.0, lost: int = 0, *, lighter: float
     light = replace(run, rows=rows, weight=both / (PERIODS * PERIOD))
     p = defaults("vibro_hardening")
     # Grains so soft that each alone would have the recorded peak force.
-    softer = hits.peaks()[0] / hits.shadows(hardening.own_modulus(p), p["restitution"])[0][0]
+    softer = hits.peaks()[0] / hits.shadows(hits.radii, own_modulus(p), p["restitution"])[0][0]
     p["youngs_modulus"] *= softer**2.5
     replicas = []
     for _ in range(packings):
@@ -231,12 +231,12 @@ def test_octaves_of_a_record_are_those_of_its_impacts_and_of_its_length(tmp_path
     """Impacts at even times that are half sines of the recorded peak and duration; and a window that is too short for low bands."""
     hits = record(tmp_path)
     pulses = hits.peaks() / np.sin(0.5 * np.pi * (LASTS - 1) / LASTS), np.full(60, LASTS * STRIDE * STEP)
-    both = hardening.Noise(hits, pulses, pulses)
+    both = Noise(hits, pulses, pulses)
     assert both.ratio == pytest.approx(1.0, abs=0.1) and abs(both.unexplained) < 1e-12
     short = replace(hits, periods=1, period=0.02)
     with np.errstate(invalid="ignore"):
-        few = hardening.Noise(short, pulses, pulses)
-    recorded, hard = hardening.octave_curves([few, few])
+        few = Noise(short, pulses, pulses)
+    recorded, hard = octave_curves([few, few])
     assert 10 ** recorded["place"][0] == pytest.approx(50.1, abs=0.1) and len(hard["place"]) == 31
 
 
@@ -315,21 +315,6 @@ def test_grains_hammer_the_part_and_nothing_is_missed(engine: str, changes: Any,
     assert found["friction_power"]["value"] > 0.0
 
 
-def octave_control(folder: Path) -> Control:
-    """The same record with all bands, and without the last of them."""
-    right = measured(folder)
-    with pytest.MonkeyPatch.context() as patch:
-        part_noise = sys.modules[hardening.Noise.__module__]
-        both = part_noise.mean_squares
-
-        def without_the_last(*given: Any) -> Any:
-            bands, squares = both(*given)
-            return type(bands)(bands.numbers[:-1]), squares[:-1]
-
-        patch.setattr(part_noise, "mean_squares", without_the_last)
-        return Control("a third octave that is left out", right, measured(folder))
-
-
 def controls_vibro_hardening(folder: Path) -> Iterator[Control]:
     folder.mkdir(exist_ok=True)
     right = measured(folder / "right")
@@ -338,6 +323,6 @@ def controls_vibro_hardening(folder: Path) -> Iterator[Control]:
     yield Control("impacts of half the mass", right, measured(folder / "half", lighter=0.5))
     yield Control("impacts of half the mass", thrown(folder / "thrown"), thrown(folder / "lighter", heavier=0.5))
     yield Control("angles from the normal", thrown(folder / "thrown"), thrown(folder / "turned", turned=True))
-    yield octave_control(folder / "octaves")
+    yield octave_left_out(lambda: measured(folder / "octaves"))
     yield Control("a bed that is calmer at 10 mm than at 2 mm", amplitude_study(1.0, 3.0), amplitude_study(1.0, 0.8))
     yield Control("impacts that grow with every halving of the step", step_study(0.01, 0.0101, 0.0102), step_study(0.01, 0.012, 0.014))

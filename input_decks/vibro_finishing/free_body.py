@@ -18,8 +18,9 @@ CORNERS = 48
 @dataclass(frozen=True)
 class FreeBody:
     """Spheres of one `radius` (m) at `places` (n, 2) along x and z from the centre of mass (m); `mass` (kg) and `moment` of inertia about
-    y (kg m2) of the surface's inside."""
+    y (kg m2) of the inside of the `surface`: its triangles (n, 3, 3), from there, too."""
 
+    surface: Array
     places: Array
     radius: float
     mass: float
@@ -43,13 +44,18 @@ def free_body(p: Parameters) -> FreeBody:
     spheres = voxels(flat, p.part_sphere)
     if len(spheres.radii) < 2:
         raise DembarkError("there is one sphere in the part", "", "lower part_sphere")
-    return FreeBody((spheres.centres - mesh.mass.centre)[:, [0, 2]], 0.5 * p.part_sphere, p.part_density * mesh.mass.volume,
-                    float(p.part_density * mesh.mass.inertia[1, 1]))
+    return FreeBody(mesh.triangles - mesh.mass.centre, (spheres.centres - mesh.mass.centre)[:, [0, 2]], 0.5 * p.part_sphere,
+                    p.part_density * mesh.mass.volume, float(p.part_density * mesh.mass.inertia[1, 1]))
+
+
+def circle(diameter: float) -> Array:
+    """Corners (n, 2) in m of the cylinder's cross-section."""
+    return polygon(diameter, CORNERS, (0.0, 0.0))
 
 
 def cylinder(diameter: float, length: float) -> Array:
     """Triangles (n, 3, 3) in m of a closed prism along y about the origin, with corners on a circle of `diameter` (m)."""
-    x, z = polygon(diameter, CORNERS, (0.0, 0.0)).T
+    x, z = circle(diameter).T
     near, far = (np.column_stack([x, np.full(CORNERS, side * length), z]) for side in (-0.5, 0.5))
     turn = np.roll(np.arange(CORNERS), -1)
     sides = [np.stack([near, far, far[turn]], axis=1), np.stack([near, far[turn], near[turn]], axis=1)]

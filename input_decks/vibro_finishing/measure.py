@@ -7,10 +7,13 @@ import numpy as np
 
 from dembark.input_decks.common.estimates import divided, over_chaotic, ratio
 from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
+from dembark.input_decks.common.part_impacts import impact_measurement
 from dembark.input_decks.common.power_law import ordered
 from dembark.input_decks.common.vibratory_trough import Trough, drifts, numerical_changes, read, rigidity, spectra
 from dembark.postproc.measurement import Estimate, Measurement, Points, Replicas, Value, exact, over_replicas
 from dembark.postproc.studies import measured
+
+from .touches import contact_record, part_surface
 
 
 def measure(replicas: Replicas) -> Measurement:
@@ -39,7 +42,13 @@ def measure(replicas: Replicas) -> Measurement:
     if p["part"] == "sphere" and p["part_diameter"] == diameter and p["part_density"] == p["grain_density"]:
         worst = max((one.likeness() for one in runs), key=abs)
         values["likeness"] = Value(exact(worst), exact(0.0))
-    return Measurement(values, [drifts(runs), spectra(runs, "trough")])
+    records = [contact_record(one) for one in replicas]
+    # The record has neither friction between grains and part nor bridges.
+    friction = p["grain_friction"] if p["static_friction"] is None else p["static_friction"]
+    if friction == 0.0 and p["bridge_volume"] == 0.0:
+        values["touch_balance"] = Value(exact(max(one.gap for one in records)), exact(0.0))
+    hits = impact_measurement(records, part_surface(replicas[0]), p, runs[0].speed)
+    return Measurement({**values, **hits.values}, [drifts(runs), spectra(runs, "trough"), *hits.profiles], surface=hits.surface)
 
 
 def study(name: str, points: Points, along: str) -> Measurement:

@@ -11,12 +11,12 @@ from dembark.common.errors import DembarkError
 from dembark.input_decks.common import packing
 from dembark.input_decks.common.motion import TABLE, amplitude, motion, table_length
 from dembark.input_decks.common.setup import Number, Parameters, Setup, contacts
-from dembark.input_decks.common.trough import sites, sites_within, trough
-from dembark.input_decks.common.vibration import fixed_phases, highest_speed, suitable_step
+from dembark.input_decks.common.trough import prism, sites, sites_within, trough
+from dembark.input_decks.common.vibration import fixed_phases, highest_speed, sample_stride, suitable_step
 from dembark.physics import WallMotion
 from dembark.postproc.walls.mesh import cut, read_stl
 
-from .free_body import free_body
+from .free_body import circle, free_body
 
 FOLDER = Path(__file__).parent
 # How fast grains may be thrown, over the drive's highest speed: one that part and side pinched flew up with 5.6 times that.
@@ -58,17 +58,25 @@ def setup(p: Parameters) -> Setup:
     bodies = packing.grains(p, places, box)
     # All centres in one plane.
     bodies = replace(bodies, positions=bodies.positions * [1, 0, 1])
-    more = {"free_part": 1, "drive_speed": speed, "begin": still * numbers["period_steps"]}
+    more = {"free_part": 1, "drive_speed": speed, "begin": still * numbers["period_steps"], "sample": sample_stride(p, speed, step),
+            "touches": numbers["steps"] - min(p.impact_periods, p.periods) * numbers["period_steps"],
+            # A grain that is farther than this from the middle of the part does not touch it.
+            "near": around + 0.5 * packing.largest(p)}
     tables: dict[str, tuple[Number, ...]] = {"motion_words": moving.words}
     if body is None:
+        part = prism(circle(p.part_diameter), 2.0 * p.grain_diameter)
         bodies = bodies.joined(np.array([[centre[0], 0.0, centre[1]]]), p.part_diameter, p.part_density, 1)
     else:
+        part = body.surface
+        # Its middle is at the first sphere a and the last b: x = x_a + along (x_b - x_a) + across (z_b - z_a), and z likewise.
+        first, last = (complex(z, x) for x, z in body.places[[0, -1]])
+        share = -first / (last - first)
         more |= {"body_spheres": len(body.places), "body_mass": body.mass, "body_moment": body.moment, "body_x": centre[0],
-                 "body_z": centre[1]}
+                 "body_z": centre[1], "along": share.real, "across": share.imag}
         more |= {f"{which}_{axis}": place for which, row in (("first", 0), ("last", -1))
                  for axis, place in zip("xz", body.places[row].tolist(), strict=True)}
         tables["body_places"] = tuple(body.places.ravel().tolist())
-    return Setup(numbers["steps"], step, bodies, {**numbers, **more, **contacts(p, skin=0.2)}, {"trough": mesh}, tables)
+    return Setup(numbers["steps"], step, bodies, {**numbers, **more, **contacts(p, skin=0.2)}, {"trough": mesh, "part": part}, tables)
 
 
 def driven(p: Parameters, moving: WallMotion, start: float) -> tuple[float, float]:

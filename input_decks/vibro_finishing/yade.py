@@ -25,7 +25,7 @@ def free_body():
         sphere.state.mass = p.body_mass / len(spheres)
         sphere.state.inertia = Vector3(1, 1, 1) * (0.4 * sphere.state.mass * radius**2)
     O.bodies[number].state.vel = -0.5 * O.dt * Vector3(*weight)
-    return number
+    return number, members[1:]
 
 
 if p.part == "sphere":
@@ -33,14 +33,26 @@ if p.part == "sphere":
     part = O.bodies[ids[1][-1]]
     part.state.mass = 4.0 / 3.0 * math.pi * part.shape.radius**3 * p.part_density
     part.state.inertia = Vector3(1, 1, 1) * (p.part_inertia * part.state.mass * part.shape.radius**2)
+    spheres = ids[1][-1:]
     dembark.block(ids[1])
 else:
-    dembark.block([*ids[1], free_body()])
+    number, spheres = free_body()
+    dembark.block([*ids[1], number])
 walls = {"trough": dembark.mesh("trough.stl", materials[1])}
 moving = dembark.motion(p, walls, ["trough"])
 # The account refuses clumps.
 history = dembark.machine_history(ids[1], weight, moving) if p.part == "sphere" else None
 account = EnergyAccount() if p.part == "sphere" else None
-record = dembark.Recorder(p, walls, boundary="ff ff ff", gravity=weight, history=history, report=p.stride, moving=moving)
+frames = dembark.Recorder(p, walls, boundary="ff ff ff", gravity=weight, history=history, report=p.stride, moving=moving)
+touches = dembark.PartWriter("trough", walls["trough"], spheres, dembark.box(), boundary="ff ff ff", gravity=weight)
+
+
+def record():
+    """Write what is due at this step, and several times in each impact the grains on the part."""
+    frames()
+    if O.iter >= p.touches and (O.iter - p.touches) % p.sample == 0:
+        touches.write()
+
+
 O.engines = dembark.mesh_loop(p, materials, weight, account=account, moving=moving)
-dembark.run(p.steps)
+dembark.run(p.steps, outputs=("time.csv", "grains.dump", "contacts.dump", "touches.dump"))

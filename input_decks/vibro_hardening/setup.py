@@ -12,14 +12,12 @@ from dembark.input_decks.common.bodies import read_body
 from dembark.input_decks.common.motion import amplitude, motion
 from dembark.input_decks.common.setup import Array, Parameters, Setup, contacts
 from dembark.input_decks.common.trough import polygon, prism, sites, trough
-from dembark.input_decks.common.vibration import fixed_phases, highest_speed, impact, suitable_step
+from dembark.input_decks.common.vibration import fixed_phases, highest_speed, sample_stride, suitable_step
 from dembark.postproc.walls.mesh import cut
 
 from .throws import aimed
 
 FOLDER = Path(__file__).parent
-# Samples of the grains on the part in an impact at the trough's highest speed.
-SAMPLES = 12
 
 
 def setup(p: Parameters) -> Setup:
@@ -50,9 +48,8 @@ def setup(p: Parameters) -> Setup:
     if p.thrown_speed is not None:
         meet = (numbers["first"] + 0.5 * numbers["period_steps"]) * step
         bodies = aimed(bodies, float(part[..., 2].max()), p.thrown_speed, meet, p.gravity)
-    _, lasts = impact(p, fastest)
-    samples = max(1, int(lasts / (SAMPLES * step)))
-    more = {"drive_speed": highest_speed(p), "begin": still * numbers["period_steps"], "sample": samples, "part_reach": reach}
+    more = {"drive_speed": highest_speed(p), "begin": still * numbers["period_steps"], "sample": sample_stride(p, fastest, step),
+            "part_reach": reach}
     return Setup(numbers["steps"], step, bodies, {**numbers, **more, **contacts(p, skin=0.2)},
                  {"trough": trough(p.trough_width, p.trough_side, p.strips, depth), "part": part}, {"motion_words": moving.words})
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,10 +14,11 @@ from dembark.common.choices import Value, pick
 from dembark.common.errors import DembarkError
 from dembark.validation import engines, results
 from dembark.validation.case.deck import require_capable, require_measure, require_steps, sources
-from dembark.validation.case.folders import discover, require_known
-from dembark.validation.case.model import Case
+from dembark.validation.case.folders import discover, find, require_known
+from dembark.validation.case.model import Case, Study
 from dembark.validation.case.resolve import for_replica, portable, resolve
 from dembark.validation.engines import Engine
+from dembark.validation.judge.result import COMPARISON, METRICS
 
 from .fitted import FittedParameters
 
@@ -130,8 +131,13 @@ class Plan:
         return {str(one.place / run.folder_name): run for one in self.series for run in one.runs}
 
     def as_json(self, estimates: Mapping[Path, float | None] | None = None) -> dict[str, Any]:
-        """The content of plan.json; `estimates`: expected wall times (s) of a run by places of series."""
-        return {**self.facts, "runs": [{"folder": str(one.place / run.folder_name), "inputs": run.inputs,
+        """The content of plan.json; `estimates`: expected wall times (s) of a run by places of series. `results`: the files of series,
+        studies and comparisons that a report counts."""
+        places = [one.place for one in self.series]
+        measured = dict.fromkeys([*places, *(place for _, place, _ in studies(places))])
+        compared = dict.fromkeys(place.parent for place in measured)
+        return {**self.facts, "results": [*(str(place / METRICS) for place in measured), *(str(place / COMPARISON) for place in compared)],
+                "runs": [{"folder": str(one.place / run.folder_name), "inputs": run.inputs,
                                         **({"estimate": estimates.get(one.place)} if estimates else {})}
                                        for one in self.series for run in one.runs]}
 
@@ -188,6 +194,20 @@ def left_out(profile: str, only_cases: Sequence[str] = (), only_engines: Sequenc
     """The optional engines of a profile's runs that are not on this machine, and why; none where engines are named: those have to be."""
     planned = [run for case in _chosen(only_cases) for run in case.runs.get(profile, ())]
     return {} if only_engines else engines.absent(engine for run in planned for engine in run.engines)
+
+
+def studies(planned: Iterable[Path]) -> list[tuple[Study, Path, tuple[Path, ...]]]:
+    """The studies of which all variants are among the places `planned` (<case>/<variant>/<engine>), engine by engine: the study, its place,
+    and the places of its variants in its order."""
+    planned = list(planned)
+    found = []
+    for case in (find(name) for name in dict.fromkeys(place.parts[0] for place in planned)):
+        for study in case.studies.values():
+            for engine in case.engines:
+                points = tuple(Path(case.name, variant, engine) for variant in study.variants)
+                if all(point in planned for point in points):
+                    found.append((study, Path(case.name, study.folder_name, engine), points))
+    return found
 
 
 def is_finished(folder: Path, run: Run) -> bool:

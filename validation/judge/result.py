@@ -213,10 +213,23 @@ def from_json(content: Mapping[str, Any], kind: type[Kind], where: str = "") -> 
 
 
 def result_files(folder: Path) -> list[Path]:
-    """The files of all results and comparisons below a results folder, in the order of their places; where `plan.json` says that only some
-    cases were asked for, theirs."""
-    cases = (read_json(folder / PLAN) or {}).get("cases") or ["*"]
-    return sorted(path for case in cases for name in (f"{case}/*/*/{METRICS}", f"{case}/*/{COMPARISON}") for path in folder.glob(name)
+    """The files of all results and comparisons below a results folder, in the order of their places; where `plan.json` says which were
+    asked for, those."""
+    planned = (read_json(folder / PLAN) or {}).get("results")
+    return _every_file(folder) if planned is None else sorted(path for name in planned if (path := folder / name).is_file())
+
+
+def unplanned(folder: Path) -> list[Path]:
+    """Places of results of planned cases that `plan.json` does not ask for, relative to `folder`: its case was changed, or one was run
+    alone."""
+    counted = result_files(folder)
+    cases = {path.relative_to(folder).parts[0] for path in counted}
+    others = (path.relative_to(folder) for path in _every_file(folder) if path.name == METRICS and path not in counted)
+    return [path.parent for path in others if path.parts[0] in cases]
+
+
+def _every_file(folder: Path) -> list[Path]:
+    return sorted(path for name in (f"*/*/*/{METRICS}", f"*/*/{COMPARISON}") for path in folder.glob(name)
                   if "superseded" not in path.relative_to(folder).parts)
 
 

@@ -11,7 +11,7 @@ from dembark.common.errors import DembarkError
 from dembark.validation import verification
 from dembark.validation.case.folders import files, load
 from dembark.validation.case.model import STUDY_PREFIX, Case
-from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result, results
+from dembark.validation.judge.result import ComparedRecord, Comparison, QuantityRecord, Result, results, unplanned
 from dembark.validation.results import plan, states
 from dembark.validation.verification.item import Item
 
@@ -110,9 +110,11 @@ class ReportData:
 
     @property
     def left_out(self) -> str:
-        """Which optional engines were left out because they are not installed, in a sentence; empty when none was."""
+        """Optional engines that are not installed, and results that nobody asked for, in a sentence each; empty when there are none."""
         names = [engine_name(engine) for engine in self.summary.get("left_out", {})]
-        return f"Left out, because not installed on this machine: {', '.join(names)}." if names else ""
+        others = [f"{' '.join(place.parts[:-1]).replace('_', ' ')} ({engine_name(place.name)})" for place in unplanned(self.folder)]
+        return " ".join([*([f"Left out, because not installed on this machine: {', '.join(names)}."] if names else []),
+                         *([f"Not shown, because not asked for: {', '.join(others)}."] if others else [])])
 
     @property
     def missing(self) -> list[str]:

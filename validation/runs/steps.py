@@ -19,6 +19,7 @@ from dembark.common.files import retire, write_atomic
 from dembark.postproc import pictures
 from dembark.validation import analysis, metrics, provenance, results
 from dembark.validation.campaigns import targets
+from dembark.validation.campaigns.plan import studies
 from dembark.validation.case.folders import files, find
 from dembark.validation.case.model import Study
 from dembark.validation.judge import comparison, inputs
@@ -86,20 +87,6 @@ def _study_steps(folder: Path, planned: Iterable[Path]) -> list[Step]:
     return [Step(_name("study", place), "study", tuple(_name("measure", one) for one in points), folder / place / METRICS,
                  partial(_of_study, folder, study, points), measure_study, (folder, study, place, points))
             for study, place, points in studies(planned)]
-
-
-def studies(planned: Iterable[Path]) -> list[tuple[Study, Path, tuple[Path, ...]]]:
-    """The studies of which all variants are among the places `planned` (<case>/<variant>/<engine>), engine by engine: the study, its place,
-    and the places of its variants in its order."""
-    planned = list(planned)
-    found = []
-    for case in (find(name) for name in dict.fromkeys(place.parts[0] for place in planned)):
-        for study in case.studies.values():
-            for engine in case.engines:
-                points = tuple(Path(case.name, variant, engine) for variant in study.variants)
-                if all(point in planned for point in points):
-                    found.append((study, Path(case.name, study.folder_name, engine), points))
-    return found
 
 
 def _of_verification() -> str:

@@ -249,11 +249,13 @@ def test_of_many_variants_the_pdf_shows_the_worst():
 def test_a_report_of_some_cases_shows_these_alone(tmp_path):
     folder = full_size.write(tmp_path / "quick", ("silo", "log_pile"), variants=1, quantities=2, profiles=0)
     assert {row.case for row in gather(folder).rows} == {"silo", "log_pile", "verification"}
-    (folder / "plan.json").write_text(json.dumps({"runs": [], "cases": ["silo"]}))
+    (folder / "plan.json").write_text(json.dumps({"runs": [], "cases": ["silo"], "results": ["silo/variant_0/liggghts/metrics.json"]}))
     (folder / "verification.json").unlink()
     found = gather(folder)
     assert {row.case for row in found.rows} == set(found.cases) == {"silo"}
+    assert {row.engine for row in found.rows} == {"liggghts"}
     assert tally_of(folder).checks == tally(row.record for row in found.rows).checks
+    assert found.left_out == "Not shown, because not asked for: silo variant 0 (YADE)."
 
 
 def test_without_a_list_of_runs_nothing_of_other_cases_is_missing(tmp_path):

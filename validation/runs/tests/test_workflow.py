@@ -12,10 +12,10 @@ import pytest
 from harness import command, decks, engine_pid, environment, lives, stand_in, stand_in_analysis, start, wait_for  # noqa: F401
 
 from dembark.common.files import read_json
-from dembark.validation.campaigns.plan import of_profile
+from dembark.validation.campaigns.plan import of_profile, studies
 from dembark.validation.case import folders
+from dembark.validation.judge.result import result_files, unplanned
 from dembark.validation.results import states
-from dembark.validation.runs.steps import studies
 
 Command = Callable[..., tuple[int, str, str]]
 
@@ -118,6 +118,17 @@ def test_a_failed_run_is_missing_in_the_report_and_nothing_stale_takes_its_place
         "box/dry/liggghts/replica-1": "finished", "box/dry/yade/replica-1": "finished", "box/wet/liggghts/replica-1": "stopped"}
     assert "SIGKILL" in found["box/wet/liggghts/replica-1"].message
     assert (results / "box/wet/liggghts/superseded/replica-1/run.json").is_file()
+
+
+def test_a_variant_that_is_no_longer_planned_does_not_count(tmp_path: Path, command: Command, decks: Path) -> None:
+    assert command("validate")[0] == 0
+    path, results = decks / "box" / "case.toml", tmp_path / "results" / "quick"
+    path.write_text(path.read_text().replace(', {variant = "wet", engines = ["liggghts"]}', ""))
+    code, out, _ = command("validate")
+    assert code == 0 and "2 of 2 runs finished; 2 of 2 checks passed, none failed" in out
+    assert {str(path.relative_to(results).parent) for path in result_files(results)} == {"box/dry", "box/dry/liggghts", "box/dry/yade"}
+    # What was measured is kept, and named.
+    assert (results / "box/wet/liggghts/metrics.json").is_file() and unplanned(results) == [Path("box/wet/liggghts")]
 
 
 def test_replicas_that_are_no_longer_wanted_do_not_count(tmp_path: Path, command: Command, decks: Path) -> None:

@@ -9,7 +9,7 @@ from yade.dembark.fluids import CubesRecorder, FluidRecorder, FluidWriter, fluid
 from yade.dembark.frames import FrameWriter, StepMeans
 from yade.dembark.friction import set_friction
 from yade.dembark.logs import LogWriter, drum, log, log_loop, log_wall, logs
-from yade.dembark.machines import TouchWriter, machine_history
+from yade.dembark.machines import PartWriter, TouchWriter, machine_history
 from yade.dembark.moving import mesh, motion, motion_columns, motion_values
 from yade.dembark.plates import LoadedPlates
 from yade.dembark.report import fail, finish
@@ -37,9 +37,9 @@ from yade.dembark.writers import DumpWriter, EnergyWriter, HistoryWriter, energi
 
 __all__ = [
     "Balance", "CubesRecorder", "DumpWriter", "EnergyWriter", "FluidRecorder", "FluidWriter", "FrameWriter", "HistoryWriter",
-    "LoadedPlates", "LogWriter", "Recorder", "StepMeans", "StressedCell", "TouchWriter", "begin", "block", "box", "contact_loop", "drum",
-    "energies", "engine_loop", "fail", "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log", "log_loop", "log_wall",
-    "logs", "machine_history", "materials", "mesh", "mesh_loop", "motion", "motion_columns", "motion_values", "of_sorts", "options",
-    "packing", "pairs", "parameters", "periodic", "plane", "planes", "run", "set_friction", "slab_loop", "sort_materials", "table",
-    "tank_walls",
+    "LoadedPlates", "LogWriter", "PartWriter", "Recorder", "StepMeans", "StressedCell", "TouchWriter", "begin", "block", "box",
+    "contact_loop", "drum", "energies", "engine_loop", "fail", "finish", "fluid", "fluid_engine", "fluid_loop", "grains", "lattice", "log",
+    "log_loop", "log_wall", "logs", "machine_history", "materials", "mesh", "mesh_loop", "motion", "motion_columns", "motion_values",
+    "of_sorts", "options", "packing", "pairs", "parameters", "periodic", "plane", "planes", "run", "set_friction", "slab_loop",
+    "sort_materials", "table", "tank_walls",
 ]

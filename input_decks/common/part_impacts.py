@@ -1,9 +1,11 @@
-"""Impacts on a part, from a record of all grains that touch it every few steps: how often, how hard, where, and what friction and wear do.
-The record touches.dump has frames `stride` steps apart, with the grains that the part pushes in that step. An impact begins in a frame
-whose predecessor does not have the grain, and ends with the last frame that does."""
+"""Impacts on a part, from a record of all grains that touch it every few steps: how often, how hard, where, what they wear away, and
+their noise. The record has frames `stride` steps apart. An impact begins in a frame whose predecessor does not have the grain, and ends
+with the last frame that does."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -14,39 +16,40 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from dembark.physics import effective_youngs_modulus
 from dembark.physics.exact.contact_law import solved
 from dembark.physics.exact.impacts import Impacts
-from dembark.postproc import GrainsDump
-from dembark.postproc.measurement import Array, Curve, Estimate, profile
+from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Numbers, Value, exact, over_replicas, profile
 from dembark.postproc.output.vtkhdf import Surface
 from dembark.postproc.statistics import block_mean
 from dembark.postproc.walls.mesh import PRECISION, cut
+from dembark.postproc.wear import removed_volume
+
+from .estimates import divided, over_chaotic
+from .part_noise import Noise, octave_curves
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from dembark.physics import WallMotion
     from dembark.postproc.walls import MeshWall
 
 
 @dataclass(frozen=True)
 class ContactRecord:
-    """All (n,) samples of grains on the part: `steps`, `ids`, `masses` (kg), `radii` (m), `closing` (m/s): speed towards the part along its
-    normal, `slip` (m/s): speed of the centre along the part; `points` (n, 3): nearest points of the part where it was at rest (m);
-    `normals` (n, 3), to the grain; `forces` (n, 3) of the part on the grain (N); `rubbing` (W): friction times slip of the grain's surface.
-    Of a window of `periods` periods of `period` s after the step `first`, sampled every `stride` steps of `time_step` s; `area` of the part
-    (m2)."""
+    """All (n,) samples of grains on the part: `steps`, `ids`, `masses` (kg): what a grain hits with, its own with a part that is far
+    heavier; `radii` (m): of curvature of both surfaces together, and `run_radii` where the run has another part than the true one;
+    `closing` (m/s): speed towards the part along its normal, `slip` (m/s): speed of the centre along the part; `points` (n, 3): in m, where
+    on the part, in its own frame; `normals` (n, 3), to the grain; `forces` (n, 3) of the part on the grain (N). Of a window of `periods`
+    periods of `period` s after the step `first`, sampled every `stride` steps of `time_step` s; `area` of the part (m2)."""
 
     steps: NDArray[np.int64]
     ids: NDArray[np.int64]
     masses: Array
     radii: Array
+    run_radii: Array
     closing: Array
     slip: Array
     points: Array
     normals: Array
     forces: Array
-    rubbing: Array
     stride: int
     time_step: float
     first: int
@@ -79,7 +82,7 @@ class ContactRecord:
         return block_mean(self._by_period(every, self.begins) / self.period)
 
     def energies(self) -> Array:
-        """Energies (impacts,) in J of the normal motion, m v^2 / 2: the part is far heavier than a grain."""
+        """Energies (impacts,) in J of the normal motion against the part, m v^2 / 2."""
         chosen = self.begins
         return np.asarray(0.5 * self.masses[chosen] * self.closing[chosen] ** 2)
 
@@ -93,11 +96,6 @@ class ContactRecord:
         rest = block_mean(sums - mean * counts)
         return Estimate(mean, rest.half / float(counts.mean()), rest.basis)
 
-    def friction(self) -> Estimate:
-        """Power of friction on the part over its area (W/m2)."""
-        every = np.ones(len(self.steps), bool)
-        return block_mean(self._by_period(self.rubbing, every) * self.stride * self.time_step / self.period / self.area)
-
     def impulse(self) -> Array:
         """Impulse (3,) in N s of the part on the grains in the window."""
         inside = self.steps > self.first
@@ -108,11 +106,11 @@ class ContactRecord:
         closing, slip = self.closing[self.begins], self.slip[self.begins]
         return np.hypot(closing, slip), np.arctan2(closing, slip)
 
-    def shadows(self, modulus: float, restitution: float) -> tuple[Array, Array]:
+    def shadows(self, radii: Array, modulus: float, restitution: float) -> tuple[Array, Array]:
         """Peak forces (impacts,) in N and durations (impacts,) in s of half sines (see `lone_impacts`) of the same impacts, each solved
-        anew as that of a single grain, with another `modulus` (Pa, E*)."""
+        anew as that of a single grain, with the `radii` (n,) in m and another `modulus` (Pa, E*)."""
         chosen = self.begins
-        return lone_impacts(self.masses[chosen], self.radii[chosen], self.closing[chosen], modulus, restitution)
+        return lone_impacts(self.masses[chosen], radii[chosen], self.closing[chosen], modulus, restitution)
 
     def peaks(self) -> Array:
         """Largest recorded forces (impacts,) in N along the normal, while the grain stays on the part."""
@@ -166,52 +164,77 @@ def _damped(restitution: float) -> float:
     return float(solved(unit, 100).force[0] / unit.peak_force[0])
 
 
-def read_record(path: Path, motion: WallMotion, part: MeshWall, *, stride: int, time_step: float, first: int, periods: int, period: float,
-                depth: float) -> ContactRecord:
-    """The record `path` of a `part`, which is where it is at rest and moves as `motion`; the window begins with step `first`. The layer of
-    grains is `depth` (m) wide, so much of the part counts in its area."""
-    dump = GrainsDump(path)
-    # In most frames nothing touches the part: these need not be read.
-    frames = [dump[int(number)] for number in np.flatnonzero(dump.counts)]
-    steps = np.concatenate([np.full(len(frame.ids), frame.step) for frame in frames] or [np.empty(0, np.int64)]).astype(np.int64)
-
-    def column(name: str) -> Array:
-        return np.concatenate([getattr(frame, name) for frame in frames])
-
-    forces, places = np.concatenate([frame.wall_forces["vessel"] for frame in frames]), column("positions")
-    shift, speed = motion.displacement(steps * time_step), motion.velocity(steps * time_step)
-    here = places - shift
-    points = part.places(here).points
-    away = here - points
-    length = np.linalg.norm(away, axis=1, keepdims=True)
-    normal = away / length
-    own = column("velocities") - speed
-
-    def along(vectors: Array) -> Array:
-        return np.asarray(vectors - np.einsum("na,na->n", vectors, normal)[:, None] * normal)
-
-    surface = own + np.cross(column("omegas"), -length * normal)
-    rubbing = -np.einsum("na,na->n", along(forces), along(surface))
-    around = float(np.linalg.norm(np.diff(outline(part), axis=1), axis=2).sum())
-    return ContactRecord(steps, column("ids").astype(np.int64), column("masses"), column("radii"), -np.einsum("na,na->n", own, normal),
-                         np.linalg.norm(along(own), axis=1), points, normal, forces, rubbing, stride, time_step, first, periods, period,
-                         around * depth)
+def own_modulus(p: Numbers) -> float:
+    """E* (Pa) of a grain on the part in the run."""
+    return effective_youngs_modulus(*[p["youngs_modulus"], p["poisson_ratio"]] * 2)
 
 
-def histogram(runs: list[ContactRecord], unit: float) -> Curve:
+def true_modulus(p: Numbers) -> float:
+    """E* (Pa) of what grains and part are made of."""
+    return effective_youngs_modulus(p["grain_material_modulus"], p["poisson_ratio"], p["part_material_modulus"], p["poisson_ratio"])
+
+
+def volumes(one: ContactRecord, p: Numbers) -> Array:
+    """Volume (impacts,) in m^3 that each impact removes, by Finnie."""
+    return removed_volume(one.masses[one.begins], *one.paths(), p["flow_pressure"])
+
+
+def lone_impact(one: ContactRecord, p: Numbers) -> float:
+    """Median over impacts of the recorded peak force over that of one grain alone, with the modulus of the run."""
+    return float(np.median(one.peaks() / one.shadows(one.run_radii, own_modulus(p), p["restitution"])[0]))
+
+
+def impact_measurement(records: Sequence[ContactRecord], part: MeshWall, p: Numbers, speed: float) -> Measurement:
+    """What the group `part_impacts` of quantities declares, its curves, and the map on the surface of the `part`, of the `records` of all
+    packings; `speed` (m/s): highest of the drive. Where nothing hit the part in one of them, only the number of impacts."""
+    rate = Value(over_replicas([one.rate() for one in records]))
+    if not all(one.begins.any() for one in records):
+        return Measurement({"impact_rate": rate})
+    unit = 0.5 * p["grain_density"] * math.pi / 6.0 * p["grain_diameter"] ** 3 * speed**2
+    worn = [volumes(one, p) for one in records]
+    shadows = [one.shadows(one.radii, true_modulus(p), p["restitution"]) for one in records]
+    forces = [peaks for peaks, _ in shadows]
+    surface = surface_map(part, records, forces, worn, p["grain_diameter"])
+    wear = surface.values["wear"][0]
+    noise = [Noise(one, one.shadows(one.run_radii, own_modulus(p), p["restitution"]), pulses)
+             for one, pulses in zip(records, shadows, strict=True)]
+    values = {
+        "impact_rate": rate, "impact_energy": Value(divided(over_replicas([one.energy() for one in records]), unit)),
+        "wear_rate": Value(divided(over_replicas([one.rate(own) for one, own in zip(records, worn, strict=True)]), records[0].area)),
+        "wear_of_an_impact": Value(over_chaotic(float(own.mean()) for own in worn)),
+        "wear_peak": Value(over_chaotic([float(wear.max() / np.average(wear, weights=surface.areas))])),
+        "peak_force": Value(over_chaotic(float(own.mean()) for own in forces)),
+        "peak_force_99": Value(over_chaotic(float(np.quantile(own, 0.99)) for own in forces)),
+        "dents": Value(over_chaotic(
+            float((mean_pressures(own, one.radii[one.begins], true_modulus(p)) > p["flow_pressure"]).mean())
+            for one, own in zip(records, forces, strict=True))),
+        "lone_impact": Value(over_chaotic(lone_impact(one, p) for one in records), exact(1.0)),
+        "octave_sum": Value(exact(max(abs(one.unexplained) for one in noise)), exact(0.0)),
+        "pulse_noise": Value(over_chaotic(one.ratio for one in noise)),
+        "audible_force": Value(over_chaotic(one.audible for one in noise)),
+    }
+    return Measurement(values, [histogram(records, unit), force_histogram(records, forces), *octave_curves(noise)], surface=surface)
+
+
+def histogram(runs: Sequence[ContactRecord], unit: float) -> Curve:
     """Curve of the impacts per second over the logarithm of their energy in units of `unit` (J)."""
     return _counts("impacts", "Impacts on the part", "log₁₀ of the energy / (m V² / 2)", np.linspace(-4.0, 2.0, 25), runs,
                    [one.energies() / unit for one in runs])
 
 
-def force_histogram(runs: list[ContactRecord], forces: list[Array]) -> Curve:
+def force_histogram(runs: Sequence[ContactRecord], forces: list[Array]) -> Curve:
     """Curve of the impacts per second over the logarithm of their peak `forces` (impacts,) in N of each run."""
     return _counts("forces", "Peak forces on the part", "log₁₀ of the peak force / N", np.linspace(-1.0, 4.0, 26), runs, forces)
 
 
-def _counts(name: str, title: str, along: str, edges: Array, runs: list[ContactRecord], values: list[Array]) -> Curve:
+def _counts(name: str, title: str, along: str, edges: Array, runs: Sequence[ContactRecord], values: list[Array]) -> Curve:
     found = [np.histogram(np.log10(own), bins=edges)[0] / one.window for one, own in zip(runs, values, strict=True)]
     return profile(name, title, along, "impacts per second and bin", 0.5 * (edges[1:] + edges[:-1]), found)
+
+
+def surface_area(part: MeshWall, depth: float) -> float:
+    """Area (m2) of the outside of the `part` that a layer of grains `depth` (m) wide can reach."""
+    return float(np.linalg.norm(np.diff(outline(part), axis=1), axis=2).sum()) * depth
 
 
 def outline(part: MeshWall) -> Array:
@@ -251,7 +274,7 @@ def nearest(pieces: Array, places: Array) -> NDArray[np.int64]:
     return np.asarray(np.argmin(((points - places[:, None]) ** 2).sum(axis=2), axis=1), np.int64)
 
 
-def surface_map(part: MeshWall, runs: list[ContactRecord], forces: list[Array], volumes: list[Array], depth: float) -> Surface:
+def surface_map(part: MeshWall, runs: Sequence[ContactRecord], forces: list[Array], volumes: list[Array], depth: float) -> Surface:
     """What impacts of all `runs` do to strips of the part, as long as the layer of grains is wide (`depth`, m) and up to half of that wide:
     impacts and energy a second and area, largest and mean of the peak `forces` (N), and depth that is worn away a second, by `volumes`
     (m^3) of the impacts of each run."""
