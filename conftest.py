@@ -1,5 +1,6 @@
 """Options that select long tests, and what all tests share."""
 
+import os
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -14,6 +15,9 @@ for _package in ("common", "input_decks", "postproc", "validation"):
     for _tests in sorted(_ROOT.glob(f"{_package}/**/tests")):
         _name = ".".join(_tests.parent.relative_to(_ROOT).parts)
         sys.modules.setdefault(_name, import_module(f"dembark.{_name}"))
+
+# Ranks of LAMMPS that wait for each other sleep instead of using the processors of the other tests: its MPI asks without rest by default.
+os.environ |= {"MPIR_CVAR_CH4_PROGRESS_THROTTLE": "1", "MPIR_CVAR_CH4_PROGRESS_THROTTLE_NO_PROGRESS_COUNT": "10"}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
