@@ -5,6 +5,10 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+# Ranks of LAMMPS and threads that wait sleep instead of taking the processors from the other tests; by default they ask without rest.
+os.environ |= {"OMP_WAIT_POLICY": "passive", "MPIR_CVAR_CH4_PROGRESS_THROTTLE": "1",
+               "MPIR_CVAR_CH4_PROGRESS_THROTTLE_NO_PROGRESS_COUNT": "10"}
+
 # Before pytest takes the folder packaging/ for this library.
 import packaging.version  # noqa: F401
 import pytest
@@ -15,9 +19,6 @@ for _package in ("common", "input_decks", "postproc", "validation"):
     for _tests in sorted(_ROOT.glob(f"{_package}/**/tests")):
         _name = ".".join(_tests.parent.relative_to(_ROOT).parts)
         sys.modules.setdefault(_name, import_module(f"dembark.{_name}"))
-
-# Ranks of LAMMPS that wait for each other sleep instead of using the processors of the other tests: its MPI asks without rest by default.
-os.environ |= {"MPIR_CVAR_CH4_PROGRESS_THROTTLE": "1", "MPIR_CVAR_CH4_PROGRESS_THROTTLE_NO_PROGRESS_COUNT": "10"}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
