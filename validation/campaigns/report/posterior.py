@@ -89,7 +89,7 @@ def log_density(surrogates: Sequence[Surrogate], outputs: Sequence[Output], plac
                 allowed: Allowed = everywhere) -> Array:
     """Log of the posterior density at `places` (n, parameters) but for a constant: the prior is uniform in the quantiles where a point is
     `allowed`, the targets are normal, and what the surrogate does not know adds to their variance."""
-    inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
+    inside: NDArray[np.bool_] = np.asarray(((places >= 0.0) & (places <= 1.0)).all(axis=1))
     inside[inside] = allowed(places[inside])
     found = np.where(inside, 0.0, -math.inf)
     if inside.any():
