@@ -1,8 +1,14 @@
 """Options that select long tests, and what all tests share."""
 
+import os
 import sys
 from importlib import import_module
 from pathlib import Path
+
+# Ranks of LAMMPS and threads that wait sleep instead of taking the processors from the other tests; by default they ask without rest.
+# OpenBLAS, which cannot do so, has one thread; it reads this when numpy is imported.
+os.environ |= {"OMP_WAIT_POLICY": "passive", "OPENBLAS_NUM_THREADS": "1", "MPIR_CVAR_CH4_PROGRESS_THROTTLE": "1",
+               "MPIR_CVAR_CH4_PROGRESS_THROTTLE_NO_PROGRESS_COUNT": "10"}
 
 # Before pytest takes the folder packaging/ for this library.
 import packaging.version  # noqa: F401

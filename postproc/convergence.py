@@ -12,8 +12,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scipy.optimize import brentq
-
 # Roache's safety factors: where three refinements show the formal order, and where the order is taken on trust.
 SAFETY, SAFETY_UNSEEN_ORDER = 1.25, 3.0
 _ORDER_AGREES, _LOWEST_ORDER = 0.1, 0.5
@@ -53,6 +51,7 @@ def observed_order(h: Sequence[float], values: Sequence[float]) -> float:
     first, second = values[1] - values[0], values[2] - values[1]
     if first == 0.0 or second / first <= 0.0:
         return math.nan
+    from scipy.optimize import brentq
     wanted = second / first
 
     def ratio(p: float) -> float:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 Array = NDArray[np.float64]
 
@@ -48,13 +47,15 @@ def exact(value: float, half: float = 0.0) -> Estimate:
 
 def student(degrees: float, confidence: float = CONFIDENCE) -> float:
     """Two-sided quantile of Student's t distribution."""
-    return float(special.stdtrit(degrees, 0.5 + 0.5 * confidence)) if degrees >= 1 else math.inf
+    from scipy.special import stdtrit
+    return float(stdtrit(degrees, 0.5 + 0.5 * confidence)) if degrees >= 1 else math.inf
 
 
 def tail_probability(limit: float, half: float, degrees: float) -> float:
     """Probability that a value with the 95 % half-width `half` lies farther from its mean than `limit`; infinite `degrees`: normal."""
+    from scipy.special import ndtr, stdtr
     reach = student(degrees) * limit / half
-    return 2.0 * float(special.stdtr(degrees, -reach) if math.isfinite(degrees) else special.ndtr(-reach))
+    return 2.0 * float(stdtr(degrees, -reach) if math.isfinite(degrees) else ndtr(-reach))
 
 
 def correlation_time(series: Array) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -12,9 +12,11 @@ import typer
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import write_atomic
-from dembark.input_decks.common import bodies
 from dembark.postproc.cli_options import STL_UNITS, positive
 from dembark.validation import engines
+
+if TYPE_CHECKING:
+    from dembark.input_decks.common import bodies
 
 app = typer.Typer()
 
@@ -39,6 +41,7 @@ def body(
     name: Annotated[str | None, typer.Option(help="Name in files and scripts; default: that of the file.")] = None,
 ) -> None:
     """Write a rigid body of spheres for an engine, with the mass and the inertia of what a closed surface encloses."""
+    from dembark.input_decks.common import bodies
     pick(engine, engines.names(), "engine", "in --engine")
     pick(unit, tuple(STL_UNITS), "unit", "in --unit")
     if sum(one is not None for one in (spheres, along, spacing)) != 1:

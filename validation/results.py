@@ -10,18 +10,19 @@ inputs, `metrics.json` and `comparison.json` what was measured. The status file 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from dembark.common.choices import pick
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json, write_atomic
 from dembark.common.lock import is_held
 from dembark.validation.judge.result import COMPARISON, METRICS, PLAN, as_row, result_files
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RECORD = "run.json"
 
@@ -155,7 +156,7 @@ def runs(folder: Path | str) -> pd.DataFrame:
         named = dict(zip(("case", "variant", "engine"), parts[-4:-1], strict=True)) | {"replica": int(place.rpartition("-")[2])}
         rows.append(named | row | {key: content[key] for key in ("case", "variant", "engine", "steps", "time_step", "resume", "parameters",
                                                                 "provenance") if key in content})
-    return pd.json_normalize(rows)
+    return _table(rows)
 
 
 def quantities(folder: Path | str) -> pd.DataFrame:
@@ -165,12 +166,12 @@ def quantities(folder: Path | str) -> pd.DataFrame:
     evidence, ...) with the 95 % intervals as low, high, reference_low, reference_high, then `parameters.*` in SI units, `measured.*` (at,
     commit) and `provenance.*` of the runs. DembarkError when there is no such folder.
     """
-    return pd.json_normalize(list(_rows(_existing(folder), METRICS)))
+    return _table(_rows(_existing(folder), METRICS))
 
 
 def comparisons(folder: Path | str) -> pd.DataFrame:
     """One row for each quantity of two engines: `value` of `engine`, `reference` that of `reference_engine`; else as `quantities`."""
-    return pd.json_normalize(list(_rows(_existing(folder), COMPARISON)))
+    return _table(_rows(_existing(folder), COMPARISON))
 
 
 def _rows(folder: Path, kind: str) -> Iterator[dict[str, Any]]:
@@ -188,6 +189,11 @@ def _existing(folder: Path | str) -> Path:
     if not path.is_dir():
         raise DembarkError(f"{folder} is not a folder", "", "give results/<profile>, the folder of a campaign, or that of a run")
     return path
+
+
+def _table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
+    import pandas as pd
+    return pd.json_normalize(list(rows))
 
 
 TABLES = {"quantities": quantities, "comparisons": comparisons, "runs": runs}

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from dembark import _fields
 from dembark.common.errors import DembarkError
@@ -197,6 +196,7 @@ def interpolate(field: Array, grid: Grid, places: Array) -> Array:
 
     NaN of empty cells counts as 0.
     """
+    from scipy.ndimage import map_coordinates
     if field.shape[:3] != grid.shape:
         raise DembarkError(f"the mean velocity is on {field.shape[:3]} cells", f"the grid has {grid.shape}",
                            "give it on the grid of the fields")

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erf
 
 from dembark.common.errors import DembarkError
 
@@ -52,6 +51,7 @@ class Kernel:
     def variance(self) -> float:
         """Second moment along one axis (m2): the integral of x^2 phi."""
         if self.name == "gaussian":
+            from scipy.special import erf
             density = np.exp(-0.5 * CUTOFF**2) / np.sqrt(2.0 * np.pi)
             return self.width**2 * (1.0 - 2.0 * CUTOFF * density / float(erf(CUTOFF / np.sqrt(2.0))))
         return self.width**2 * (1.0 / 12.0 if self.name == "lucy" else 0.2)
@@ -91,5 +91,6 @@ def line_nodes(kernel: Kernel, length: float) -> tuple[Array, Array]:
 
 def cumulative(kernel: Kernel, distance: Array) -> Array:
     """Integral of the Gaussian's factor of one axis from minus infinity to `distance` (m); 0 ... 1."""
+    from scipy.special import erf
     scaled = np.clip(distance / kernel.width, -CUTOFF, CUTOFF)
     return np.asarray(0.5 + 0.5 * erf(scaled / np.sqrt(2.0)) / erf(CUTOFF / np.sqrt(2.0)))

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -34,9 +33,12 @@ class Rates:
     """The rates to reckon with for a campaign that has measured some already in the folder `path`, if it is there."""
 
     def __init__(self, path: Path | None = None) -> None:
-        self._runs = results.runs(path) if path is not None and path.is_dir() else pd.DataFrame()
-        if "provenance.particle_steps_per_second" in self._runs:
-            self._runs = self._runs.dropna(subset="provenance.particle_steps_per_second")
+        self._runs = None
+        if path is None or not path.is_dir():
+            return
+        runs = results.runs(path)
+        if "provenance.particle_steps_per_second" in runs:
+            self._runs = runs.dropna(subset="provenance.particle_steps_per_second")
             self._runs["cores"] = self._runs["provenance.ranks"] * self._runs["provenance.threads"]
 
     def of(self, case: Case, engine: str, cores: int = 1) -> Rate:
@@ -45,14 +47,14 @@ class Rates:
         The median of the folder's runs of this case, those of this host and this number of cores before others; else the engine's facts.
         """
         runs = self._runs
-        if "cores" in runs:
+        if runs is not None:
             runs = runs[(runs["case"] == case.name) & (runs["engine"] == engine)]
             mine = runs[runs["provenance.host"] == socket.gethostname()]
             where = "this host" if len(mine) else "other hosts"
             runs = mine if len(mine) else runs
             alike = runs[runs["cores"] == cores]
             runs = alike if len(alike) else runs
-        if len(runs) and "cores" in runs:
+        if runs is not None and len(runs):
             value = (runs["provenance.particle_steps_per_second"] / runs["cores"]).median()
             return Rate(float(value), f"{len(runs)} runs measured on {where}")
         facts = engines.facts(engine)

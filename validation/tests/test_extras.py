@@ -35,6 +35,14 @@ def test_commands_of_the_core():
         assert seen in text
 
 
+def test_the_command_line_starts_without_the_libraries_of_its_commands():
+    """They take longer than all the rest of the start."""
+    libraries = {"MDAnalysis", "matplotlib", "pandas", "scipy", "xarray"}
+    code = f"import sys\nimport dembark.validation.cli\nprint({libraries} & {{*sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
 def test_physics_and_dumps_are_of_the_core_and_what_is_missing_is_one_line(tmp_path):
     (tmp_path / "grains.dump").write_text("ITEM: TIMESTEP\n5\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
                                           "ITEM: ATOMS id type x y z vx vy vz radius mass\n1 1 .5 .5 .5 0 0 0 .1 2\n")

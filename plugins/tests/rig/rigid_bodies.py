@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,23 +62,41 @@ class Motion:
     grain_velocities: Array
 
 
-def written(folder: Path, flight: Flight, engine: str) -> bodies.Mesh:
-    """Writes the body's files into `folder`; the surface."""
+@cache
+def _files(surface: str, words: tuple[str, ...]) -> dict[str, bytes]:
+    """What `dembark body` writes, and the surface: many flights are of one body."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "one.stl").write_text(surface)
+        assert cli.main(["body", str(folder / "one.stl"), *words, "--out", name]) == 0
+        return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def written(folder: Path, flight: Flight, engine: str) -> None:
+    """Writes the body's files into `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "one.stl").write_text(stl([tuple(map(tuple, corners)) for corners in flight.triangles.tolist()]))
-    words = ["body", str(folder / "one.stl"), "--engine", engine, "--density", repr(flight.density),
-             *(["--spheres", str(flight.spheres)] if flight.spheres else ["--spacing", repr(flight.spacing)])]
-    assert cli.main([*words, "--at", f"0,0,{flight.height!r}", "--out", str(folder)]) == 0
-    return bodies.read_body(folder / "one.stl")
+    words = ("--engine", engine, "--density", repr(flight.density), "--at", f"0,0,{flight.height!r}",
+             *(["--spheres", str(flight.spheres)] if flight.spheres else ["--spacing", repr(flight.spacing)]))
+    for name, content in _files(stl([tuple(map(tuple, corners)) for corners in flight.triangles.tolist()]), words).items():
+        (folder / name).write_bytes(content)
+
+
+@cache
+def _rest(surface: bytes, spheres: int, spacing: float) -> Array:
+    """Places of the spheres from the centre of mass (m)."""
+    with TemporaryDirectory() as name:
+        path = Path(name) / "one.stl"
+        path.write_bytes(surface)
+        mesh = bodies.read_body(path)
+    return (bodies.covering(mesh, spheres) if spheres else bodies.voxels(mesh, spacing)).centres - mesh.mass.centre
 
 
 def fly(engine: str, folder: Path, flight: Flight) -> Motion:
     """The flight in an engine."""
-    mesh = written(folder, flight, engine)
+    written(folder, flight, engine)
     {"liggghts": _liggghts, "lammps": _lammps, "yade": _yade}[engine](folder, flight)
     steps, frames = read_dump(folder / "grains.dump")
-    filled = bodies.covering(mesh, flight.spheres) if flight.spheres else bodies.voxels(mesh, flight.spacing)
-    rest = filled.centres - mesh.mass.centre
+    rest = _rest((folder / "one.stl").read_bytes(), flight.spheres, flight.spacing)
     table = np.array([frame for step, frame in zip(steps, frames, strict=True) if step > 0])[:, :, 1:]
     if engine == "liggghts":
         # There grains are made first: `set` does not go with bodies.

@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from dembark.common.files import write_atomic
 from dembark.validation.campaigns import fitted
-from dembark.validation.campaigns.sampling import Sample
+from dembark.validation.campaigns.sampling import Row, Sample
 from dembark.validation.campaigns.spec import SweepSpec
 from dembark.validation.campaigns.targets import CurveTarget
 from dembark.validation.case.resolve import merged
 
-from .posterior import Array, Output, Posterior, Surrogate, everywhere, posterior
+from .posterior import Allowed, Array, Output, Posterior, Surrogate, everywhere, posterior
 from .sensitivity import variance_of_mean
 from .sweeps import Point, Sweep
 
@@ -216,8 +217,8 @@ def _curves(known: Posterior, outputs: Sequence[Output],
                  for name, distance in distances.items())
 
 
-def _allowed(spec: SweepSpec, sample: Sample, base: str) -> Callable[[Array], bool]:
-    """Whether a point breaks no condition of the case, and no range of a parameter."""
+def _allowed(spec: SweepSpec, sample: Sample, base: str) -> Allowed:
+    """Whether points break no condition of the case, and no range of a parameter."""
     variables = list(sample.variables.values())
     everything = bool(spec.derived) or any("min" not in one.numbers for one in variables)
     # Of those that the sampled parameters have no part in, each point keeps all.
@@ -226,12 +227,14 @@ def _allowed(spec: SweepSpec, sample: Sample, base: str) -> Callable[[Array], bo
         return everywhere
     fixed = merged(spec.case, spec.profile, base, spec.fixed)
 
-    def allowed(place: Array) -> bool:
-        values = [one.values(place[at:at + 1])[0] for at, one in enumerate(variables)]
-        row = dict(zip(sample.variables, values, strict=True))
+    def fine(row: Row) -> bool:
         if everything:
             return not spec.broken(row, (base,))
         return all(one.expression(fixed | row) in (None, True) for one in conditions)
+
+    def allowed(places: Array) -> NDArray[np.bool_]:
+        columns = [one.values(places[:, at]) for at, one in enumerate(variables)]
+        return np.array([fine(dict(zip(sample.variables, values, strict=True))) for values in zip(*columns, strict=True)], bool)
 
     return allowed
 

@@ -30,9 +30,12 @@ class Output:
     uncertainty: float
 
 
-def everywhere(_place: Array) -> bool:
+Allowed = Callable[[Array], NDArray[np.bool_]]
+
+
+def everywhere(places: Array) -> NDArray[np.bool_]:
     """All points are allowed."""
-    return True
+    return np.ones(len(places), bool)
 
 
 class Surrogate:
@@ -83,10 +86,11 @@ class Posterior:
 
 
 def log_density(surrogates: Sequence[Surrogate], outputs: Sequence[Output], places: Array,
-                allowed: Callable[[Array], bool] = everywhere) -> Array:
+                allowed: Allowed = everywhere) -> Array:
     """Log of the posterior density at `places` (n, parameters) but for a constant: the prior is uniform in the quantiles where a point is
     `allowed`, the targets are normal, and what the surrogate does not know adds to their variance."""
-    inside = np.array([bool((place >= 0.0).all() and (place <= 1.0).all()) and allowed(place) for place in places])
+    inside: NDArray[np.bool_] = np.asarray(((places >= 0.0) & (places <= 1.0)).all(axis=1))
+    inside[inside] = allowed(places[inside])
     found = np.where(inside, 0.0, -math.inf)
     if inside.any():
         for surrogate, one in zip(surrogates, outputs, strict=True):
@@ -96,7 +100,7 @@ def log_density(surrogates: Sequence[Surrogate], outputs: Sequence[Output], plac
     return found
 
 
-def posterior(places: Array, outputs: Sequence[Output], allowed: Callable[[Array], bool] = everywhere, seed: int = 0) -> Posterior:
+def posterior(places: Array, outputs: Sequence[Output], allowed: Allowed = everywhere, seed: int = 0) -> Posterior:
     """Samples of the quantiles of the parameters that reproduce the targets of `outputs`, from what was measured at `places`."""
     from threadpoolctl import threadpool_limits
 
@@ -105,7 +109,7 @@ def posterior(places: Array, outputs: Sequence[Output], allowed: Callable[[Array
         return _sampled(places, outputs, allowed, seed)
 
 
-def _sampled(places: Array, outputs: Sequence[Output], allowed: Callable[[Array], bool], seed: int) -> Posterior:
+def _sampled(places: Array, outputs: Sequence[Output], allowed: Allowed, seed: int) -> Posterior:
     import emcee
 
     surrogates = [Surrogate(places, one) for one in outputs]
