@@ -179,7 +179,8 @@ def test_any_path(law, path, data):
     out = law.follow(load, K, AREA, path, time_step=0.3)
     assert np.isfinite(out.force).all() and np.isfinite(out.slip).all()
     size = np.linalg.norm(out.force, axis=1)
-    assert (size <= limit(law, law.static_friction, np.maximum(load, 0.0)) * (1 + 1e-12)).all()
+    # The spring is the path less the slip, which round-off leaves uncertain by a part of the path.
+    assert (size <= limit(law, law.static_friction, np.maximum(load, 0.0)) * (1 + 1e-12) + 1e-15 * K * np.abs(path).max()).all()
     assert (np.diff(out.dissipated_energy, prepend=0.0) >= 0.0).all()
     assert (out.slip >= 0.0).all()
     angle = data.draw(st.floats(0.0, 6.0))
