@@ -87,17 +87,22 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
     kind, half, chance, decided = "relative", None, None, ""
     tolerance: float | None = CAP
     bounds = [one.agreement for one in both if one.agreement is not None]
-    if value.value is None or reference.value is None or not (bounds or reference.value):
+    if value.value is None or reference.value is None:
         verdict, reason = "fail", "no value to compare"
     elif bounds:
         kind, tolerance, deviation = "absolute", max(bounds), value.value - reference.value
         same = abs(deviation) <= tolerance
         verdict, reason = ("pass", "") if same else ("fail", "the values must agree")
     else:
-        deviation = (value.value - reference.value) / abs(reference.value)
+        # Of nothing there is no tenth: that nothing happens in both engines agrees, that it does in one alone does not.
+        deviation = (value.value - reference.value) / abs(reference.value) if reference.value else None
         few, unknown = min(packings(value.basis), packings(reference.basis)), next((one for one in both if one.half is None), None)
         if planned < PACKINGS and (unknown is not None or few < PACKINGS):
             tolerance, verdict, reason = None, "info", f"{PACKINGS} packings in each engine are needed to compare them"
+        elif deviation is None:
+            seen = value.value and value.half is not None and abs(value.value) > value.half
+            verdict, reason = ("fail", "the other engine's is 0") if seen else ("info", "a tenth of 0 decides nothing")
+            verdict, reason = (verdict, reason) if value.value else ("pass", "")
         elif unknown is not None or few < PACKINGS:
             verdict, decided = "info", f"{PACKINGS} packings in each engine or more"
             reason = "an interval comes from fewer packings than planned" if unknown is None else (

@@ -36,6 +36,13 @@ def test_deterministic_numbers_agree_within_their_bound(one, other, verdict):
         assert found.deviation_kind == "absolute" and found.tolerance == 1e-9
 
 
+@pytest.mark.parametrize(("value", "half", "verdict"), [(0.0, 0.0, "pass"), (0.2, 0.1, "fail"), (0.2, 0.3, "info")])
+def test_what_does_not_happen_in_one_engine_must_not_in_the_other(value, half, verdict):
+    found = pair(entry(0.0, None), entry(value, None, half), "liggghts", "yade")
+    assert found.verdict == verdict and found.deviation is None
+    assert pair(entry(0.0, None), entry(value, None, half), "liggghts", "yade", planned=1).verdict == verdict
+
+
 def test_numbers_without_a_bound_are_compared_by_their_intervals():
     assert "agreement" not in as_json(entry(1.0, None))
     assert pair(entry(1.0, None, 0.03), entry(1.04, None, 0.03), "liggghts", "yade").verdict == "pass"
