@@ -32,25 +32,30 @@ def published(source: str) -> tuple[Array, Array]:
     return times, fronts
 
 
-@cached_per_replica
 def front(run: Replica) -> tuple[Array, Array]:
     """Times T = t √(2g/a) and places over a of the front: the foremost particle and half a spacing."""
-    return _places(run, 1)
+    times, foremost, _ = _fronts(run)
+    return times, foremost
 
 
 def thick_front(run: Replica) -> tuple[Array, Array]:
     """The same of the particle that has AHEAD a² of water before it, where the water is thicker than a particle."""
-    return _places(run, max(round(AHEAD * run.parameters["resolution"] ** 2), 1))
+    times, _, thick = _fronts(run)
+    return times, thick
 
 
-def _places(run: Replica, number: int) -> tuple[Array, Array]:
-    """Times T and places over a of the particle that is the `number`-th from the front, and half a spacing."""
+@cached_per_replica
+def _fronts(run: Replica) -> tuple[Array, Array, Array]:
+    """Times T, and places over a of both fronts."""
     p = run.parameters
     width, unit = p["column_width"], math.sqrt(p["column_width"] / (2.0 * p["gravity"]))
-    frames = [(frame.step * run.time_step / unit, (np.sort(frame.positions[:, 0])[-number] + 0.5 * width / p["resolution"]) / width)
-              for frame in run.grains()]
-    times, places = np.array([(0.0, 1.0), *frames]).T
-    return times, places
+    number = max(round(AHEAD * p["resolution"] ** 2), 1)
+    rows = [(0.0, 1.0, 1.0)]
+    for frame in run.grains():
+        foremost = np.sort(frame.positions[:, 0])[[-1, -number]]
+        rows.append((frame.step * run.time_step / unit, *(foremost + 0.5 * width / p["resolution"]) / width))
+    times, foremost, thick = np.array(rows).T
+    return times, foremost, thick
 
 
 def pace(own: tuple[Array, Array], source: str) -> tuple[Estimate, Estimate]:

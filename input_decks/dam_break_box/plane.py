@@ -1,7 +1,8 @@
 """The same dam break in the plane, with a box as wide as the tank, where finer particles are cheap and theory knows the face of the box.
 
 `python -m dembark.input_decks.dam_break_box.plane 28 56` prints the mean pressures at P1 to P4 from 0.7 to 0.8 s with so many particles
-over the depth of the column, next to a jet of water of the depth before the box, turned by a plate whose edge it leaves without pressure.
+over the depth of the column, next to a jet as deep as the water at the gauge H2 before the box, turned by a plate whose edge it leaves
+without pressure.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ from dembark.physics.sph import lattice, tank_walls
 from dembark.postproc.measurement import Array
 
 from .pressures import kernel
+from .sensors import FACE, GAUGES
 
 # The experiment (m): column, way to the face of the box, its sides, tank; heights of P1 to P4.
 LENGTH, DEPTH, WAY, BOX, TANK, HIGH = 1.228, 0.55, 1.1675, 0.161, 3.22, 1.4
-HEIGHTS = np.array([0.021, 0.061, 0.101, 0.141])
-# Of the mean (s), where the flow has become steady; m before the face, where the depth of the water is taken: the gauge H2.
-WINDOW, GAUGE = (0.7, 0.8), 0.1675
+HEIGHTS = np.array(FACE)
+# Of the mean (s), where the flow has become steady.
+WINDOW = (0.7, 0.8)
 GRAVITY, DENSITY, SMOOTHING = 9.81, 1000.0, 1.3
 
 
@@ -65,6 +67,7 @@ def simulated(number: int) -> tuple[Array, float]:
     inside = (np.arange(round(BOX / dx)) + 0.5) * dx
     water.add_wall(np.stack([part.ravel() for part in np.meshgrid(face + inside, BOX - inside)], axis=1))
     water.run(WINDOW[0])
+    gauge = front + GAUGES["H2"]
     rows = []
     while water.time < WINDOW[1]:
         water.run(0.002)
@@ -72,7 +75,7 @@ def simulated(number: int) -> tuple[Array, float]:
         near = np.abs(places[:, 0] - face) < 2.0 * h
         x, head = places[near], water.pressures[near] + DENSITY * GRAVITY * places[near, 1]
         weights = kernel(np.hypot(x[:, 0] - face, x[:, 1] - HEIGHTS[:, None]), h)
-        depth = np.count_nonzero(np.abs(places[:, 0] - face + GAUGE) < 2.0 * dx) * dx / 4.0
+        depth = np.count_nonzero(np.abs(places[:, 0] - gauge) < 2.0 * dx) * dx / 4.0
         rows.append([*(weights @ head / weights.sum(axis=1) - DENSITY * GRAVITY * HEIGHTS), depth])
     *pressures, depth = np.mean(rows, axis=0)
     return np.array(pressures), float(depth)

@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 from dembark.common.errors import DembarkError
 from dembark.input_decks.common.momentum import CONTACT_PARTS
 from dembark.input_decks.common.part_impacts import own_modulus
+from dembark.input_decks.common.setup import friction, liquid
 from dembark.input_decks.common.trough import sites_within
 from dembark.input_decks.common.trough import trough as trough_mesh
 from dembark.input_decks.common.vibratory_trough import Trough, joined, read
@@ -51,8 +52,15 @@ def with_hits(run: Trough, hits: FreeRecord) -> dict[Any, Any]:
     return {read.__wrapped__: run, finishing.contact_record.__wrapped__: hits, finishing.part_surface.__wrapped__: SURFACE}
 
 
+def of_contacts(parameters: dict[str, Any]) -> dict[str, Any]:
+    """What a deck derives from parameters: coefficients of friction and whether there are bridges."""
+    p = SimpleNamespace(**parameters)
+    return {**friction(p), **liquid(p)}
+
+
 def measured(run: Trough, booked: float = 1.0, hits: FreeRecord | None = None, **parameters: Any) -> dict[str, Any]:
-    replica = Replica(Path(), {"parameters": defaults("vibro_finishing", motion_frequency=12.5, **parameters)})
+    given = defaults("vibro_finishing", motion_frequency=12.5, **parameters)
+    replica = Replica(Path(), {"parameters": given, "derived": of_contacts(given)})
     replica.__dict__["_read"] = with_hits(replace(run, rows=account(dict(run.rows), booked)), hits or hits_of_ball())
     return judged("vibro_finishing", finishing.measure([replica]))
 
@@ -60,8 +68,8 @@ def measured(run: Trough, booked: float = 1.0, hits: FreeRecord | None = None, *
 def measured_body(folder: Path, weight: float = 1.0, noise: float = 0.0) -> dict[str, Any]:
     """A bed whose last three grains are taken for the spheres of a body; `weight` times that of the bed, with `noise` of each grain."""
     run = trough(folder, noise=noise)
-    replica = Replica(folder, {"parameters": defaults("vibro_finishing", motion_frequency=12.5, part="cylinder"),
-                               "derived": {"body_spheres": 3}})
+    given = defaults("vibro_finishing", motion_frequency=12.5, part="cylinder")
+    replica = Replica(folder, {"parameters": given, "derived": {"body_spheres": 3, **of_contacts(given)}})
     replica.__dict__["_read"] = with_hits(replace(run, weight=weight * run.weight), hits_of_ball())
     return judged("vibro_finishing", finishing.measure([replica]))
 

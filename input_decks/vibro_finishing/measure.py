@@ -44,8 +44,8 @@ def measure(replicas: Replicas) -> Measurement:
         values["likeness"] = Value(exact(worst), exact(0.0))
     records = [contact_record(one) for one in replicas]
     # The record has neither friction between grains and part nor bridges.
-    friction = p["grain_friction"] if p["static_friction"] is None else p["static_friction"]
-    if friction == 0.0 and p["bridge_volume"] == 0.0:
+    derived = replicas[0].derived
+    if derived["grain_static"] == 0.0 and not derived["wet"]:
         values["touch_balance"] = Value(exact(max(one.gap for one in records)), exact(0.0))
     hits = impact_measurement(records, part_surface(replicas[0]), p, runs[0].speed)
     return Measurement({**values, **hits.values}, [drifts(runs), spectra(runs, "trough"), *hits.profiles], surface=hits.surface)

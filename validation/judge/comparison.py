@@ -100,9 +100,11 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
         if planned < PACKINGS and (unknown is not None or few < PACKINGS):
             tolerance, verdict, reason = None, "info", f"{PACKINGS} packings in each engine are needed to compare them"
         elif deviation is None:
-            seen = value.value and value.half is not None and abs(value.value) > value.half
-            verdict, reason = ("fail", "the other engine's is 0") if seen else ("info", "a tenth of 0 decides nothing")
-            verdict, reason = (verdict, reason) if value.value else ("pass", "")
+            verdict, reason = "info", "a tenth of 0 decides nothing"
+            if not value.value:
+                verdict, reason = "pass", ""
+            elif value.half is not None and abs(value.value) > value.half:
+                verdict, reason = "fail", "the other engine's is 0"
         elif unknown is not None or few < PACKINGS:
             verdict, decided = "info", f"{PACKINGS} packings in each engine or more"
             reason = "an interval comes from fewer packings than planned" if unknown is None else (

@@ -222,7 +222,7 @@ def result_files(folder: Path) -> list[Path]:
 def unplanned(folder: Path) -> list[Path]:
     """Places of results of planned cases that `plan.json` does not ask for, relative to `folder`: its case was changed, or one was run
     alone."""
-    counted = result_files(folder)
+    counted = set(result_files(folder))
     cases = {path.relative_to(folder).parts[0] for path in counted}
     others = (path.relative_to(folder) for path in _every_file(folder) if path.name == METRICS and path not in counted)
     return [path.parent for path in others if path.parts[0] in cases]
