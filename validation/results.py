@@ -141,8 +141,9 @@ def runs(folder: Path | str) -> pd.DataFrame:
     """
     folder = _existing(folder)
     planned = {state.folder: state for state in states(folder)}
-    places = dict.fromkeys([*planned, *(str(path.parent.relative_to(folder)) for path in sorted(folder.glob(f"**/replica-*/{RECORD}"))
-                                       if "superseded" not in path.parts and not path.parent.parent.name.startswith("."))])
+    found = (path.parent.relative_to(folder) for path in sorted(folder.glob(f"**/replica-*/{RECORD}")))
+    places = dict.fromkeys([*planned, *(str(place) for place in found if not any(part == "superseded" or part.startswith(".")
+                                                                                 for part in place.parts))])
     rows = []
     for place in places:
         content, planned_state = read_json(folder / place / RECORD) or {}, planned.get(place)
