@@ -177,6 +177,33 @@ def test_misspelt_names_of_an_own_case(file: str, old: str, new: str, expected: 
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(("key", "value", "words"), [
+    ("steps", "0", "steps = 0 of a run of case mine, from [derived], it must be an integer of at least 1"),
+    ("steps", "0.4", "steps = 0 of"), ("steps", "-5", "steps = -5 of"), ("time_step", "-1e-5", "time_step = -1e-05 of a run of case mine"),
+    ("time_step", "0 * height", "time_step = 0.0 of a run of case mine, from [derived], it must be a positive number of seconds"),
+])
+def test_a_run_without_a_step_is_refused(key: str, value: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("DEMBARK_CASES", str(tmp_path / "cases"))
+    assert main(["new-case", "mine", "--in", str(tmp_path / "cases")]) == 0
+    file = tmp_path / "cases/mine/case.toml"
+    before, _, after = file.read_text().partition("[derived]")
+    numbers = {"time_step": "1e-5", "stride": "10", "steps": "500", key: value}
+    lines = "".join(f'{name} = "{one}"\n' for name, one in numbers.items())
+    file.write_text(f"{before}[derived]\n{lines}\n{after[after.index('[quantities]'):]}")
+    capsys.readouterr()
+    refused(("deck", "mine", "--engine", "liggghts", "--out", "out"), words, capsys)
+
+
+@pytest.mark.parametrize(("steps", "words"), [("0", "steps = 0 of a run of case mine, from"), ("100.5", "steps = 100.5 of"),
+                                              ("'100'", "steps = '100' of"), ("float('nan')", "steps = nan of")])
+def test_a_set_up_without_a_step_is_refused(steps: str, words: str, own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (own / "setup.py").write_text("from dembark.input_decks.common.setup import Setup\n\n\n"
+                                  f"def setup(p):\n    return Setup(steps={steps}, time_step=1e-5)\n")
+    capsys.readouterr()
+    refused(("deck", "mine", "--engine", "liggghts", "--out", "out"), words, capsys)
+
+
 @pytest.mark.parametrize("place", ['Path(__file__).with_name("reference") / "film.csv"',
                                    'HERE / "reference/film.csv"', 'HERE.joinpath("film.csv")'])
 @pytest.mark.parametrize("content", [
