@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .dumps.frames import NO_FLAGS, Array, ColumnsError, DumpError, RawFrame, integers, less_edges, numbered, take
+from .dumps.frames import NO_FLAGS, Array, ColumnsError, DumpError, RawFrame, check_periods, integers, less_edges, numbered, take
 from .dumps.opening import Trajectory, open_dump
 from .dumps.typed import TypedDump
 from .dumps.units import KEPT_UNITS, unit_style
@@ -77,6 +77,7 @@ class ContactsDump(TypedDump[ContactFrame]):
 
     def _frame(self, raw: RawFrame) -> ContactFrame:
         where = f"{self.path}, step {raw.step}"
+        check_periods(raw, where)
         if not raw.flagged:
             self._say(raw.step, NO_FLAGS)
         if not raw.columns and not len(raw.values):

@@ -260,7 +260,9 @@ class _Joined:
         frame before."""
         places = grains.positions[row]
         if grains.periodic.any() and not grains.unwrapped:
-            edges, before = cell(grains.low, grains.high, grains.tilt), self.last[there]
+            # A box of a plane layer may have no thickness, where it is not periodic.
+            flat = ~grains.periodic & ~(grains.high > grains.low)
+            edges, before = cell(grains.low, np.where(flat, grains.low + 1.0, grains.high), grains.tilt), self.last[there]
             if grains.has("velocities"):
                 moves = np.linalg.solve(edges.T, interval * grains.velocities[row].T)[grains.periodic]
                 self.farthest = max(self.farthest, float(np.abs(moves).max(initial=0.0)))

@@ -78,3 +78,18 @@ def test_times(tmp_path):
     (tmp_path / "time.csv").write_text("step,time\n1,2\n")
     with pytest.raises(DumpError, match="header"):
         read_times(tmp_path / "time.csv")
+
+
+@pytest.mark.parametrize("bounds", ["0 0", "1 0"])
+@pytest.mark.parametrize(("kind", "row", "reader"), [
+    ("ATOMS", "ATOMS id x y z radius mass\n1 0.1 0.2 0.3 0.01 1", GrainsDump),
+    ("ENTRIES", f"ENTRIES {' '.join(f'c_contacts[{n}]' for n in range(1, 13))}\n0.9 0 0 0.1 0 0 1 2 1 0 0 1", ContactsDump)])
+def test_a_periodic_box_without_a_length_is_refused(tmp_path, bounds, kind, row, reader):
+    head = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF {}\n1\nITEM: BOX BOUNDS pp {} ff\n0 1\n{}\n0 1\nITEM: {}\n"
+    (tmp_path / "a.dump").write_text(head.format(kind, "pp", bounds, row))
+    low, high = bounds.split()
+    with pytest.raises(DumpError, match=f"step 0: the box is periodic along y, but reaches from {low} to {high}"):
+        reader(tmp_path / "a.dump")[0]
+    # Around a plane layer, a box that is not periodic may be flat.
+    (tmp_path / "a.dump").write_text(head.format(kind, "ff", bounds, row))
+    assert len(reader(tmp_path / "a.dump")[0].ids) == 1

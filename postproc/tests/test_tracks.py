@@ -100,6 +100,14 @@ def test_positions_that_are_not_wrapped_are_used_though_they_all_lie_in_the_box(
     assert found.positions[1, 0, 0] == pytest.approx(-0.25 if columns.endswith("c") else 0.75)
 
 
+def test_a_plane_layer_may_have_a_box_without_thickness(tmp_path):
+    text = "".join(grains_text(100 * frame, np.array([[x, 0.0, 0.5]]), [0.1], box=((0.0, 1.0), (0.0, 0.0), (0.0, 1.0)), flags="pp ff ff")
+                   for frame, x in enumerate((0.75, 0.05, 0.35)))
+    (tmp_path / "grains.dump").write_text(text.replace("x y z ix iy iz", "x y z a b c"))
+    found = tracking.follow(select(open_source(tmp_path / "grains.dump", time_step=1e-5), range(3)))
+    assert found.positions[:, 0, 0] == pytest.approx([0.75, 1.05, 1.35]) and not found.positions[:, 0, 1].any()
+
+
 @pytest.mark.parametrize(("image_flags", "frames", "noted"), [(False, 30, True), (False, 120, False), (True, 30, False)])
 def test_a_note_says_where_grains_pass_half_a_period_between_frames(tmp_path, monkeypatch, capsys, image_flags, frames, noted):
     """0.5 m/s over 1.5 ms or 0.375 ms in a period of 1 mm."""
