@@ -35,7 +35,7 @@ def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
     try:
         return _checked(case, "measure", load(case).measure(replicas))
     except DumpError as error:
-        raise RunError(f"a run of case {case.name} could not be measured", str(error)) from None
+        raise RunError(f"a run of case {case.name} could not be measured", str(error), "to run it again, delete its folder") from None
 
 
 def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Measurement:

@@ -226,6 +226,12 @@ def test_a_table_that_cannot_be_read_is_reported_before_a_run(place: str, conten
     assert all(word in str(caught.value) for word in ("film.csv", f"{module}, line 3"))
 
 
+def test_a_file_with_the_mark_that_some_editors_put_first(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = own / "case.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes())
+    assert main(["cases", "mine"]) == 0 and "mine: grains settle on a floor" in capsys.readouterr().out
+
+
 def test_own_decks_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("DEMBARK_DECKS", "nowhere")
     folders.load.cache_clear()

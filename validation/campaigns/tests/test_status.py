@@ -115,6 +115,22 @@ def test_the_command_of_a_hint_can_be_pasted(results: Path, tmp_path: Path, caps
     assert shlex.split(hint[1:-1]) == ["dembark", "resume", str(moved)]
 
 
+def test_a_clock_that_is_ahead_leaves_no_negative_time(results: Path) -> None:
+    status(results, 12, state="running", began=time.time() + 500.0, step=60, steps=100, resumed_from=10)
+    with lock(lock_file(results / "box/n=1/yade/replica-2"), "held"):
+        assert look(results).states[1].left == 0.0
+
+
+def test_a_result_that_was_cut_off_is_not_left_out_of_a_table(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for n in (1, 2):
+        (results / f"box/n={n}/yade").mkdir(parents=True, exist_ok=True)
+        write(results / f"box/n={n}/yade/metrics.json", Result("box", f"n={n}", "yade", CHECKS))
+    path = results / "box/n=2/yade/metrics.json"
+    path.write_text(path.read_text()[:100])
+    assert main(["export", str(results)]) == 1
+    assert f"{path} cannot be read, it holds no JSON, measure it again" in capsys.readouterr().err
+
+
 def test_a_folder_below_superseded_is_read_and_one_below_it_is_not(results: Path, tmp_path: Path) -> None:
     for place in ("superseded/own/replica-1", "superseded/own/superseded/replica-2", "superseded/own/.old/yade/replica-3"):
         (tmp_path / place).mkdir(parents=True)
