@@ -226,6 +226,20 @@ def test_a_table_that_cannot_be_read_is_reported_before_a_run(place: str, conten
     assert all(word in str(caught.value) for word in ("film.csv", f"{module}, line 3"))
 
 
+@pytest.mark.parametrize(("table", "words"), [
+    ('[variants]\n"../x" = {}', "'../x' is not a name of a folder, [variants.../x]"), ('[variants]\n"a/b" = {}', "'a/b' is not a name"),
+    ('[variants]\n".hidden" = {}', "'.hidden' is not a name"), ('[variants]\n"a b" = {}', "'a b' is not a name"),
+    ('[profiles]\n"../x" = {}', "'../x' is not a name of a folder, [profiles.../x]"),
+    ('[studies]\n"a/b" = { title = "t", along = "restitution", variants = ["a", "b", "c"] }', "'a/b' is not a name of a folder"),
+])
+def test_what_cannot_be_a_folder_of_results_is_refused(table: str, words: str, own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its results would lie elsewhere, where no report looks for them."""
+    with (own / "case.toml").open("a") as file:
+        file.write(f"\n{table}\n")
+    capsys.readouterr()
+    refused(("cases", "mine"), words, capsys)
+
+
 def test_a_file_with_the_mark_that_some_editors_put_first(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = own / "case.toml"
     file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes())
