@@ -169,6 +169,8 @@ def status(directory: Folder) -> None:
         console.print(str(found.report), markup=False, soft_wrap=True)
     if not found.running and not found.concluded:
         lacking = "measurements or the report are missing: " if found.complete else ""
+        if folder.options(directory.resolve()).executor != "local":
+            lacking += "unless its jobs wait in the queue of the cluster, "
         console.print(f"{lacking}go on with {pasteable('dembark', 'resume', directory)}", markup=False, soft_wrap=True)
 
 

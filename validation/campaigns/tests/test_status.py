@@ -105,6 +105,14 @@ def test_status_says_that_measurements_or_the_report_are_missing(results: Path, 
     assert main(["status", str(results)]) == 0 and "resume" not in capsys.readouterr().out
 
 
+def test_jobs_that_wait_in_a_queue_need_no_second_submission(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan = json.loads((results / "plan.json").read_text())
+    for executor in ("local", "slurm"):
+        (results / "plan.json").write_text(json.dumps(plan | {"submitted": {"options": {"executor": executor}}}))
+        assert main(["status", str(results)]) == 0
+        assert ("unless its jobs wait in the queue of the cluster, go on with" in capsys.readouterr().out) == (executor == "slurm")
+
+
 def test_the_command_of_a_hint_can_be_pasted(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     moved = tmp_path / "with a space"
     moved.mkdir()
