@@ -1,5 +1,7 @@
 """Errors for users: one line each, and the exit code."""
 
+import shlex
+
 
 class DembarkError(Exception):
     """A user's mistake (exit code 2): the message says what is wrong, where, and what would be right."""
@@ -25,3 +27,9 @@ class Interrupted(RunError):
     """The user or the machine ended the work (SIGINT, SIGTERM)."""
 
     exit_code = 130
+
+
+def pasteable(*words: object) -> str:
+    """A command in quotes, for a line of text: what stands between them can be pasted, also with spaces in a path."""
+    text = shlex.join(map(str, words))
+    return f'"{text}"' if "'" in text else f"'{text}'"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .dumps.frames import NO_FLAGS, Array, ColumnsError, DumpError, RawFrame, integers, less_edges, numbered, take
+from .dumps.frames import NO_FLAGS, Array, ColumnsError, DumpError, RawFrame, check_periods, integers, less_edges, numbered, take
 from .dumps.opening import Trajectory, open_dump
 from .dumps.typed import TypedDump
 from .dumps.units import KEPT_UNITS, unit_style
@@ -20,6 +20,7 @@ _WIDTHS = {"first": 3, "second": 3, "branch": 3, "ids": 2, "forces": 3}
 # What dembark's decks write: x1 y1 z1 x2 y2 z2 id1 id2 periodic fx fy fz, whatever the header calls them.
 _DECK: Mapping[str, Column] = {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12)}
 _DECK_COLUMNS = 12
+_SAME = 1e-4  # of a branch, which six digits of a place hold
 _NUMBERED = re.compile(r"\w+\[(\d+)\]")
 # What local/gran/vtk writes.
 _LINES: Mapping[str, Column] = {"first": ("x1", "y1", "z1"), "second": ("x2", "y2", "z2"), "ids": ("id1", "id2"),
@@ -62,7 +63,7 @@ class ContactsDump(TypedDump[ContactFrame]):
         name given are in `extra` under that of the dump. `units` is the unit style of a dump that does not name it.
         """
         super().__init__(open_dump(path, skip_truncated, stream=stream, units=units))
-        self._columns = columns
+        self._columns, self._looked = columns, False
         if columns is not None:
             lacking = [name for name in ("first", "forces", "ids") if name not in columns]
             if lacking or ("second" in columns) == ("branch" in columns):
@@ -77,6 +78,7 @@ class ContactsDump(TypedDump[ContactFrame]):
 
     def _frame(self, raw: RawFrame) -> ContactFrame:
         where = f"{self.path}, step {raw.step}"
+        check_periods(raw, where)
         if not raw.flagged:
             self._say(raw.step, NO_FLAGS)
         if not raw.columns and not len(raw.values):
@@ -90,6 +92,12 @@ class ContactsDump(TypedDump[ContactFrame]):
         extra = {name: take(raw.values, [column]) for column, name in enumerate(raw.columns) if column not in used}
         branch = parts["branch"] if "branch" in parts else less_edges(parts["second"] - parts["first"], raw)
         extra |= {name: values for name, values in parts.items() if name not in _WIDTHS}
+        ids = integers(parts["ids"], f"{where}: ids")
+        # Whoever lists each pair twice does so in every frame: one is enough, for this takes as long as reading it.
+        if not self._looked and len(ids) and (twice := _listed_twice(ids, branch)):
+            self._say(raw.step, f"the contact of grains {twice[0]} and {twice[1]} is listed twice, and counts twice, in stresses too; "
+                      "list each pair once")
+        self._looked |= len(ids) > 0
         style = unit_style(raw.units, where)
         factors = {name: style.factor(name) for name in extra}
         if style != unit_style("si", where):
@@ -97,7 +105,20 @@ class ContactsDump(TypedDump[ContactFrame]):
                 self._say(raw.step, KEPT_UNITS.format(", ".join(kept), raw.units))
             extra = {name: values * (factors[name] or 1.0) for name, values in extra.items()}
         return ContactFrame(raw.step, style.length * parts["first"], style.length * branch, style.force * parts["forces"],
-                            integers(parts["ids"], f"{where}: ids"), extra)
+                            ids, extra)
+
+
+def _listed_twice(ids: NDArray[np.int64], branch: Array) -> tuple[int, int] | None:
+    """A pair of grains that stands in two rows with one branch, the other way round or not; pairs may touch through several faces of a
+    small periodic box, with other branches."""
+    low, high = ids.min(axis=1), ids.max(axis=1)
+    order = np.lexsort((high, low))
+    same = np.flatnonzero((np.diff(low[order]) == 0) & (np.diff(high[order]) == 0))
+    for one, other in zip(order[same], order[same + 1], strict=True):
+        turned = branch[other] if ids[one, 0] == ids[other, 0] else -branch[other]
+        if np.abs(branch[one] - turned).max() <= _SAME * np.abs(branch[one]).max():
+            return int(low[one]), int(high[one])
+    return None
 
 
 def _schema(raw: RawFrame, where: str) -> Mapping[str, Column]:

@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .dumps.frames import NO_FLAGS, Array, DensityError, DumpError, RawFrame, cell, folded, integers, numbered, take
+from .dumps.frames import NO_FLAGS, Array, DensityError, DumpError, RawFrame, cell, check_periods, folded, integers, numbered, take
 from .dumps.opening import Trajectory, open_dump
 from .dumps.typed import TypedDump
 from .dumps.units import KEPT_UNITS, in_si
@@ -193,6 +193,7 @@ def _masses(table: _Table, radii: Array, density: float | None, say: Say) -> Arr
 def grain_frame(raw: RawFrame, where: str, density: float | None = None, say: Say = str) -> GrainFrame:
     """The grains of a raw frame; `density` (kg/m^3) makes the masses of solid spheres where there are none. `where` begins the messages of
     DumpError; `say` takes lines about what is odd."""
+    check_periods(raw, where)
     units = raw.units
     if not raw.flagged:
         say(NO_FLAGS)

@@ -55,6 +55,8 @@ def _table(path: Path) -> Impacts:
         values = (np.loadtxt(path, ndmin=2) if first else np.zeros(0)).reshape(-1, len(names))
     except ValueError:
         raise DumpError(f"{path}: a line does not hold {len(names)} numbers") from None
+    if len(wrong := np.flatnonzero(~np.isfinite(values).all(axis=1))):
+        raise DumpError(f"{path}: impact {wrong[0] + 1} holds a number that is not finite")
     found = np.empty(len(values), RECORD)
     for name in COLUMNS:
         found[name] = values[:, names.index(name)]

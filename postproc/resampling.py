@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dembark.common.errors import DembarkError
 
 from .replica import Array
 from .statistics import ONE_SAMPLE, Estimate, TimeBlocks, jackknife, over_replicas
@@ -44,9 +47,11 @@ def profile(name: str, title: str, along: str, across: str, place: Array, values
     given and all known; else Student's interval over three or more replicas, or the range of two.
 
     `along` and `across` label the axes of place and value; `vertical` draws the place upwards. `reference_half`: half-widths of the 95 %
-    intervals of a measured `reference`.
+    intervals of a measured `reference`. DembarkError for a name that cannot be that of a file, and for numbers that do not fit the places.
     """
-    table = np.asarray(values, float)
+    if not re.fullmatch(r"[\w.+-]+", name):
+        raise DembarkError(f"a curve is called {name!r}", "files are named after it", "take letters, digits, '_', '.', '+' and '-'")
+    table = _fitting(name, np.asarray(place, float), values, reference, half, reference_half)
     mean = table.mean(axis=0)
     entry: dict[str, Any] = {"name": name, "title": title, "along": along, "across": across, "vertical": vertical, "place": _numbers(place),
                              "value": _numbers(mean), "note": note}
@@ -62,6 +67,20 @@ def profile(name: str, title: str, along: str, across: str, place: Array, values
     if reference is not None and reference_half is not None:
         entry |= {"reference_low": _numbers(reference - reference_half), "reference_high": _numbers(reference + reference_half)}
     return entry
+
+
+def _fitting(name: str, place: Array, values: Sequence[Array], reference: Array | None, *halves: Array | None) -> Array:
+    """The `values` (replicas, n) of the curve `name` at the places (n,); DembarkError when one of them, the `reference` or the `halves`
+    has another number of them."""
+    rows = [np.asarray(one, float) for one in values]
+    fitting = [*rows, *(np.asarray(one, float) for one in (reference,) if one is not None)]
+    # One half-width for all places will do.
+    fitting += [width for one in halves if one is not None and (width := np.asarray(one, float)).ndim]
+    if not rows or any(one.shape != place.shape or one.ndim != 1 for one in fitting):
+        shapes = ", ".join("×".join(map(str, one.shape)) or "one number" for one in fitting)
+        raise DembarkError(f"the curve {name} has {'×'.join(map(str, place.shape))} places, but {shapes or 'no'} values", "",
+                           "give a value for each place, and an array of values for each replica")
+    return np.array(rows)
 
 
 def _numbers(values: Array) -> list[float | None]:

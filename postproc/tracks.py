@@ -6,7 +6,6 @@ and the self-diffusion that the growth of their scatter shows. So a run and an e
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 import re
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import write_atomic
+from dembark.common.tables import read_table
 from dembark.common.units import to_si
 
 from .contacts import ContactFrame
@@ -260,7 +260,9 @@ class _Joined:
         frame before."""
         places = grains.positions[row]
         if grains.periodic.any() and not grains.unwrapped:
-            edges, before = cell(grains.low, grains.high, grains.tilt), self.last[there]
+            # A box of a plane layer may have no thickness, where it is not periodic.
+            flat = ~grains.periodic & ~(grains.high > grains.low)
+            edges, before = cell(grains.low, np.where(flat, grains.low + 1.0, grains.high), grains.tilt), self.last[there]
             if grains.has("velocities"):
                 moves = np.linalg.solve(edges.T, interval * grains.velocities[row].T)[grains.periodic]
                 self.farthest = max(self.farthest, float(np.abs(moves).max(initial=0.0)))
@@ -295,30 +297,27 @@ def read_csv(path: Path) -> Tracks:
     """Measured tracks from a CSV file with a header: `time`, `grain`, two or three of `x`, `y`, `z`, and any of OTHERS, each with its unit
     in brackets unless it is that of SI: `time [ms],grain,x [mm],z [mm]`. A row for each grain that is seen at a time, in any order; other
     columns are not read. DembarkError in one line."""
-    try:
-        rows = [row for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) if any(word.strip() for word in row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DembarkError(f"cannot read {path}", getattr(error, "strerror", None) or str(error)) from None
-    if len(rows) < 2:
+    names, rows = read_table(path)
+    if not rows:
         raise DembarkError(f"{path} has no tracks", "", "it needs a header, such as time,grain,x,z, and rows")
-    columns = _heads(rows[0], path)
+    columns = _heads(names, path)
     axes = "".join(axis for axis in AXES if axis in columns)
     lacking = [name for name in ("time", "grain") if name not in columns]
     if lacking or len(axes) < 2:
         raise DembarkError(f"{path}: its header has no {lacking[0] if lacking else 'two of x, y and z'}", "",
                            "it must be such as time,grain,x,z or time [ms],grain,x [mm],y [mm],z [mm]")
-    table = {name: np.empty(len(rows) - 1) for name in columns}
-    for line, row in enumerate(rows[1:]):
-        for name, (number, factor) in columns.items():
+    table = {name: np.empty(len(rows)) for name in columns}
+    for place, (line, row) in enumerate(rows):
+        for name, (head, factor) in columns.items():
             try:
-                value = float(row[number])
-            except (IndexError, ValueError):
-                word = f"{row[number]!r} is no number" if number < len(row) else "it is missing"
-                raise DembarkError(f"{path}, row {line + 2}, column {name}: {word}") from None
+                value = float(row[head])
+            except ValueError:
+                word = f"{row[head]!r} is no number" if row[head].strip() else "it is missing"
+                raise DembarkError(f"{path}, line {line}, column {name}: {word}") from None
             if not math.isfinite(value):
-                raise DembarkError(f"{path}, row {line + 2}, column {name}: {row[number]!r} is not finite", "",
+                raise DembarkError(f"{path}, line {line}, column {name}: {row[head]!r} is not finite", "",
                                    "leave rows out where a grain is not seen")
-            table[name][line] = value * factor
+            table[name][place] = value * factor
     if (table["grain"] != np.round(table["grain"])).any():
         raise DembarkError(f"{path}: a number of a grain is no integer")
     ids, of_grain = np.unique(table["grain"].astype(np.int64), return_inverse=True)
@@ -337,18 +336,18 @@ def read_csv(path: Path) -> Tracks:
                   {name: spread(name) for name in OTHERS if name in table}, str(path))
 
 
-def _heads(words: Sequence[str], path: Path) -> dict[str, tuple[int, float]]:
-    """Number and factor to SI of each known column by its name."""
+def _heads(words: Sequence[str], path: Path) -> dict[str, tuple[str, float]]:
+    """The text in the header, and the factor to SI, of each known column by its name."""
     known = {"time": "s", "grain": "1", **dict.fromkeys(AXES, "m"), **{name: unit for name, (unit, _) in OTHERS.items()}}
-    found: dict[str, tuple[int, float]] = {}
-    for number, word in enumerate(words):
+    found: dict[str, tuple[str, float]] = {}
+    for word in words:
         match = _HEAD.fullmatch(word)
         name, unit = match.groups() if match else (word.strip(), None)
         if name not in known:
             continue
         if name in found:
             raise DembarkError(f"{path}: the column {name} is there twice")
-        found[name] = number, to_si(f"1 {unit}", known[name], f"{path}, column {name}") if unit else 1.0
+        found[name] = word, to_si(f"1 {unit}", known[name], f"{path}, column {name}") if unit else 1.0
     return found
 
 

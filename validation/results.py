@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dembark.common.choices import pick
-from dembark.common.errors import DembarkError
+from dembark.common.errors import DembarkError, RunError
 from dembark.common.files import read_json, write_atomic
 from dembark.common.lock import is_held
 from dembark.validation.judge.result import COMPARISON, METRICS, PLAN, as_row, result_files
@@ -63,7 +63,8 @@ class State:
         done = self.step - self.resumed_from
         if self.state != "running" or done <= 0 or not self.steps:
             return None
-        return (time.time() - self.began) * (self.steps - self.step) / done
+        # The clock of the host that began it may be ahead.
+        return max(0.0, time.time() - self.began) * (self.steps - self.step) / done
 
     def as_json(self) -> dict[str, Any]:
         """Its fields."""
@@ -141,8 +142,9 @@ def runs(folder: Path | str) -> pd.DataFrame:
     """
     folder = _existing(folder)
     planned = {state.folder: state for state in states(folder)}
-    places = dict.fromkeys([*planned, *(str(path.parent.relative_to(folder)) for path in sorted(folder.glob(f"**/replica-*/{RECORD}"))
-                                       if "superseded" not in path.parts and not path.parent.parent.name.startswith("."))])
+    found = (path.parent.relative_to(folder) for path in sorted(folder.glob(f"**/replica-*/{RECORD}")))
+    places = dict.fromkeys([*planned, *(str(place) for place in found if not any(part == "superseded" or part.startswith(".")
+                                                                                 for part in place.parts))])
     rows = []
     for place in places:
         content, planned_state = read_json(folder / place / RECORD) or {}, planned.get(place)
@@ -164,7 +166,7 @@ def quantities(folder: Path | str) -> pd.DataFrame:
 
     Columns: case, variant, engine, profile, those of QuantityRecord (name, label, unit, value, verdict, reference, deviation, tolerance,
     evidence, ...) with the 95 % intervals as low, high, reference_low, reference_high, then `parameters.*` in SI units, `measured.*` (at,
-    commit) and `provenance.*` of the runs. DembarkError when there is no such folder.
+    commit) and `provenance.*` of the runs. DembarkError when there is no such folder, or a result in it cannot be read.
     """
     return _table(_rows(_existing(folder), METRICS))
 
@@ -177,7 +179,8 @@ def comparisons(folder: Path | str) -> pd.DataFrame:
 def _rows(folder: Path, kind: str) -> Iterator[dict[str, Any]]:
     single = folder / kind
     for path in [single] if single.is_file() else [path for path in result_files(folder) if path.name == kind]:
-        content = read_json(path) or {}
+        if (content := read_json(path)) is None:
+            raise RunError(f"{path} cannot be read", "it holds no JSON", "measure it again, by 'dembark report', 'run' or 'resume'")
         common = {key: content[key] for key in ("case", "variant", "engine", "profile") if key in content}
         further = {key: dict(content[key]) for key in ("parameters", "measured", "provenance") if key in content}
         for one in content.get("quantities", ()):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -88,6 +89,17 @@ def test_writing_to_a_full_disk_says_so() -> None:
     with Path("/dev/full").open("wb", buffering=0) as full, pytest.raises(OSError, match="No space left") as caught:
         full.write(b"x")
     assert "disk is full" in str(disk_error(caught.value, Path("there")))
+
+
+def test_writing_to_a_read_only_disk_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """There, nothing can be removed either, not even what is not there."""
+    def refuse(*_args: object, **_more: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    for name in ("write_bytes", "unlink"):
+        monkeypatch.setattr(Path, name, refuse)
+    with pytest.raises(RunError, match=r"cannot write .*run\.json, Read-only file system"):
+        write_json(tmp_path / "run.json", {})
 
 
 def test_folder_is_replaced_as_a_whole(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -11,6 +10,8 @@ import numpy as np
 
 from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
+from dembark.common.tables import read_table
+from dembark.common.units import finite
 from dembark.postproc.measurement import Array, Estimate, over_replicas
 from dembark.postproc.statistics import combined
 
@@ -50,16 +51,22 @@ class Row(dict[str, str]):
         if not text.strip() and empty is not None and column in self:
             return empty
         try:
-            return float(text)
+            value = float(text)
         except ValueError:
             what = f"{column} = {text!r} is not a number" if column in self else f"there is no column {column!r}"
             raise DembarkError(self.where, what, "write the decimal point" if "," in text else nearest(column, self)
                                if column not in self else "") from None
+        try:
+            return finite(value, column, text)
+        except DembarkError as error:
+            raise DembarkError(self.where, str(error)) from None
 
 
 def reference_rows(path: Path, **wanted: str) -> list[Row]:
-    """Rows of a CSV file of reference data, with a header, whose columns have the `wanted` texts."""
-    with path.open(encoding="utf-8", newline="") as file:
-        reader = csv.DictReader(file)
-        rows = [Row(row, f"{path}, line {reader.line_num}") for row in reader]
+    """Rows of a CSV file of reference data, with a header, whose columns have the `wanted` texts; DembarkError for a table that would be
+    misread (see `read_table`), and for one without such a column."""
+    names, found = read_table(path)
+    if missing := [name for name in wanted if name not in names]:
+        raise DembarkError(f"{path} has no column {missing[0]!r}", "", nearest(missing[0], names))
+    rows = [Row(texts, f"{path}, line {line}") for line, texts in found]
     return [row for row in rows if all(row[name] == text for name, text in wanted.items())]

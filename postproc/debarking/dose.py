@@ -94,7 +94,10 @@ def doses(impacts: Impacts, logs: Logs, forces: ForceRange, edges: Array, *, sec
     tables = {name: np.zeros(spans * count * sectors) for name in ("useful", "damaging", "friction", "excess")}
     peaks, shape = [np.zeros(0)], [np.zeros(0)]
     for start in range(0, len(impacts), _CHUNK):
-        part = impacts[start : start + _CHUNK]
+        part = np.ascontiguousarray(impacts[start : start + _CHUNK])
+        if len(wrong := np.flatnonzero(~np.isfinite(part.view(np.float64).reshape(len(part), -1)).all(axis=1))):
+            # It would be neither below nor above any limit.
+            raise DumpError(f"impact {start + wrong[0] + 1} holds a number that is not finite")
         part = part[(part["time"] >= edges[0]) & (part["time"] < edges[-1])]
         fast = part[part["relative_speed"] >= least_speed]
         peaks.append(fast["peak_force"])

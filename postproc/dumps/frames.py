@@ -92,17 +92,24 @@ class Entry:
 def kept_entries(entries: Sequence[Entry]) -> tuple[list[Entry], str]:
     """The frames in the order of their steps; and one line about what that changed, or "".
 
-    A frame whose step was there before is of a run that was resumed at an earlier state: it replaces that frame, and all later ones of the
-    run before.
+    A frame whose step was there before, or that goes back to a step between others of its file, is of a run that was resumed at an earlier
+    state: it replaces that frame, and all later ones of the run before. Parts of a run that were only joined in another order begin
+    before all others of the file.
     """
     back = [other for one, other in itertools.pairwise(entries) if other.step <= one.step]
     if not back:
         return list(entries), ""
     kept: dict[int, Entry] = {}
+    before: Entry | None = None
+    least = 0
     for entry in sorted(entries, key=lambda entry: (entry.file, entry.number)):
+        if before is None or before.file != entry.file:
+            least = entry.step
+        elif least < entry.step < before.step:
+            kept = {step: one for step, one in kept.items() if step < entry.step or one.file != entry.file}
         if entry.step in kept:
             kept = {step: one for step, one in kept.items() if step < entry.step}
-        kept[entry.step] = entry
+        kept[entry.step], before, least = entry, entry, min(least, entry.step)
     dropped = len(entries) - len(kept)
     said = f"steps go back in frame {back[0].number}; frames were sorted by step"
     if dropped:
@@ -293,6 +300,12 @@ def integers(values: Array, where: str) -> NDArray[np.int64]:
         if len(large) > 2 and not (large % 10).any():
             raise DumpError(f"{where} holds large numbers that all end in 0: they were rounded to six digits; set the format of the dump")
     return exact
+
+
+def check_periods(raw: RawFrame, where: str) -> None:
+    """DumpError, begun by `where`, for a box without a length along an axis that is periodic: there is no nearest image in it."""
+    for axis in np.flatnonzero(raw.periodic & ~(raw.high > raw.low)):
+        raise DumpError(f"{where}: the box is periodic along {'xyz'[axis]}, but reaches from {raw.low[axis]:.9g} to {raw.high[axis]:.9g}")
 
 
 def cell(low: Array, high: Array, tilt: Array) -> Array:

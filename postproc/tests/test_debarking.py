@@ -84,6 +84,14 @@ def test_forces_are_sorted_by_the_range_and_slow_contacts_only_rub() -> None:
     assert len(found.peaks) == 5 and found.shape[1] == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("name", ["peak_force", "time", "relative_speed"])
+def test_an_impact_that_is_neither_hard_nor_soft_is_refused(name: str) -> None:
+    impacts = records(3)
+    impacts[name][1] = math.nan
+    with pytest.raises(DumpError, match="impact 2 holds a number that is not finite"):
+        doses(impacts, LOGS, RANGE, np.array([0.0, 4 * PERIOD]))
+
+
 def test_two_logs_share_the_friction_and_each_is_hit() -> None:
     found = doses(records(1, id_b=3, friction_loss=2.0), LOGS, RANGE, np.array([0.0, 4 * PERIOD]))
     assert found.friction.sum(axis=(0, 2)).tolist() == [1.0, 0.0, 1.0]

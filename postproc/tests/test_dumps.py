@@ -188,6 +188,13 @@ def test_frames_of_a_run_that_was_given_up_do_not_follow_those_of_the_resumed_on
         assert TextDump(path).steps.tolist() == [0, 10]
 
 
+def test_a_run_resumed_between_two_frames_replaces_what_follows(write):
+    path = write(plain(0), plain(10), plain(20), plain(30), *(frame(step, [(1, 9.0, 9.0)]) for step in (15, 25, 35)))
+    with pytest.warns(DumpWarning, match="steps go back in frame 5; frames were sorted by step, 2 that a resumed run replaces"):
+        dump = TextDump(path)
+    assert dump.steps.tolist() == [0, 10, 15, 25, 35] and [len(one.values) for one in dump] == [3, 3, 1, 1, 1]
+
+
 @pytest.mark.parametrize(("cut", "skip"), [(5, False), (9, False), (12, False), (27, True), (32, True), (60, True)])
 def test_run_killed_within_a_line_and_restarted(write, cut, skip):
     whole = plain(10, 2)

@@ -72,7 +72,8 @@ def test_columns_are_found_by_their_names(tmp_path: Path) -> None:
     (HEADER.replace(" friction_loss", "").replace(" turn_b", ""), "lacks the columns friction_loss turn_b"),
     ("", "lacks the columns id_a"),
     (HEADER + "1 2 3\n", "does not hold 17 numbers"),
-    (HEADER + " ".join(["word"] * 17) + "\n", "does not hold 17 numbers")])
+    (HEADER + " ".join(["word"] * 17) + "\n", "does not hold 17 numbers"),
+    (HEADER + " ".join(["1"] * 17) + "\n" + " ".join(["1"] * 16 + ["nan"]) + "\n", "impact 2 holds a number that is not finite")])
 def test_what_is_no_file_of_impacts_is_refused(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "impacts.txt").write_text(text)
     with pytest.raises(DumpError, match=message) as error:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from dumps import contacts_text, grains_text, write_times
 
-from dembark.postproc import ContactsDump, DumpError, GrainsDump, read_times
+from dembark.postproc import ContactsDump, DumpError, DumpWarning, GrainsDump, read_times
 
 PLACES = np.array([[0.01, 0.02, 0.03], [-0.04, 0.05, 0.123456789012], [0.07, -0.08, 0.09]])
 RADII = np.array([0.0025, 0.002, 0.003])
@@ -78,3 +78,37 @@ def test_times(tmp_path):
     (tmp_path / "time.csv").write_text("step,time\n1,2\n")
     with pytest.raises(DumpError, match="header"):
         read_times(tmp_path / "time.csv")
+
+
+@pytest.mark.parametrize("bounds", ["0 0", "1 0"])
+@pytest.mark.parametrize(("kind", "row", "reader"), [
+    ("ATOMS", "ATOMS id x y z radius mass\n1 0.1 0.2 0.3 0.01 1", GrainsDump),
+    ("ENTRIES", f"ENTRIES {' '.join(f'c_contacts[{n}]' for n in range(1, 13))}\n0.9 0 0 0.1 0 0 1 2 1 0 0 1", ContactsDump)])
+def test_a_periodic_box_without_a_length_is_refused(tmp_path, bounds, kind, row, reader):
+    head = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF {}\n1\nITEM: BOX BOUNDS pp {} ff\n0 1\n{}\n0 1\nITEM: {}\n"
+    (tmp_path / "a.dump").write_text(head.format(kind, "pp", bounds, row))
+    low, high = bounds.split()
+    with pytest.raises(DumpError, match=f"step 0: the box is periodic along y, but reaches from {low} to {high}"):
+        reader(tmp_path / "a.dump")[0]
+    # Around a plane layer, a box that is not periodic may be flat.
+    (tmp_path / "a.dump").write_text(head.format(kind, "ff", bounds, row))
+    assert len(reader(tmp_path / "a.dump")[0].ids) == 1
+
+
+def test_contacts_that_are_listed_twice_are_reported(tmp_path):
+    """Each row counts, and the stress would be twice too large."""
+    path, box = tmp_path / "contacts.dump", {"box": ((0.0, 0.025), (0.0, 1.0), (0.0, 1.0)), "flags": "pp ff ff"}
+    first, second = np.array([[0.001, 0, 0], [0.01, 0, 0]]), np.array([[0.003, 0, 0], [0.012, 0, 0]])
+    ids, forces = [[3, 7], [3, 8]], np.eye(3)[:2]
+
+    def read(*parts):
+        path.write_text(contacts_text(5, *parts, **box))
+        dump = ContactsDump(path)
+        assert len(dump[0].ids) == len(parts[2])
+        return dump.remarks
+
+    assert read(first, second, ids, forces) == ()
+    with pytest.warns(DumpWarning, match="the contact of grains 3 and 8 is listed twice, and counts twice"):
+        assert read(np.vstack([first, second[1:]]), np.vstack([second, first[1:]]), [*ids, [8, 3]], np.vstack([forces, -forces[1:]]))
+    # In a box of few grains, a pair may touch through a face, too.
+    assert read([[0.001, 0, 0]] * 2, [[0.012, 0, 0], [0.015, 0, 0]], [[3, 7]] * 2, forces) == ()

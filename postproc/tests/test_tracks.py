@@ -100,6 +100,14 @@ def test_positions_that_are_not_wrapped_are_used_though_they_all_lie_in_the_box(
     assert found.positions[1, 0, 0] == pytest.approx(-0.25 if columns.endswith("c") else 0.75)
 
 
+def test_a_plane_layer_may_have_a_box_without_thickness(tmp_path):
+    text = "".join(grains_text(100 * frame, np.array([[x, 0.0, 0.5]]), [0.1], box=((0.0, 1.0), (0.0, 0.0), (0.0, 1.0)), flags="pp ff ff")
+                   for frame, x in enumerate((0.75, 0.05, 0.35)))
+    (tmp_path / "grains.dump").write_text(text.replace("x y z ix iy iz", "x y z a b c"))
+    found = tracking.follow(select(open_source(tmp_path / "grains.dump", time_step=1e-5), range(3)))
+    assert found.positions[:, 0, 0] == pytest.approx([0.75, 1.05, 1.35]) and not found.positions[:, 0, 1].any()
+
+
 @pytest.mark.parametrize(("image_flags", "frames", "noted"), [(False, 30, True), (False, 120, False), (True, 30, False)])
 def test_a_note_says_where_grains_pass_half_a_period_between_frames(tmp_path, monkeypatch, capsys, image_flags, frames, noted):
     """0.5 m/s over 1.5 ms or 0.375 ms in a period of 1 mm."""
@@ -185,12 +193,14 @@ def test_units_stand_in_the_header(tmp_path):
     ("time,grain,x,z\n", "has no tracks"),
     ("time,x,z\n0,1,2\n", "its header has no grain, it must be such as time,grain,x,z"),
     ("time,grain,x\n0,1,2\n", "its header has no two of x, y and z"),
-    ("time,grain,x,z\n0,1,2,one\n", "row 2, column z: 'one' is no number"),
-    ("time,grain,x,z\n0,1,2\n", "row 2, column z: it is missing"),
+    ("time,grain,x,z\n0,1,2,one\n", "line 2, column z: 'one' is no number"),
+    ("time,grain,x,z\n0,1,2\n", "line 2, column z: it is missing"),
     ("time,grain,x,z\n0,1,nan,3\n", "column x: 'nan' is not finite, leave rows out where a grain is not seen"),
     ("time,grain,x,z\n0,1.5,2,3\n", "a number of a grain is no integer"),
     ("time,grain,x,z\n0,1,2,3\n0,1,2,3\n", "grain 1 is there twice at 0 s"),
-    ("time,grain,x,x,z\n0,1,2,3,4\n", "the column x is there twice"),
+    ("time,grain,x,x [mm],z\n0,1,2,3,4\n", "the column x is there twice"),
+    ("time,grain,x,z\n0,01,1,0,2,0,3\n", "line 2, has 7 fields, the header 4, separate fields by commas"),
+    ("time,grain,x,x,z\n0,1,2,3,4\n", "has two columns 'x'"),
     ("time [kg],grain,x,z\n0,1,2,3\n", "cannot convert '1 kg' to s"),
 ])
 def test_a_wrong_file_gets_one_line(tmp_path, text, line):
@@ -235,7 +245,7 @@ def test_a_run_is_compared_with_a_camera(tmp_path, monkeypatch, capsys):
     (["camera.csv", "--grains", "5-1"], "'5-1' names no grains, in --grains"),
     (["camera.csv", "--grains", "77"], "there is no grain 77, in camera.csv, it has 20 grains, 1 to 20"),
     (["camera.csv", "--diffusion", "3ms"], "'3ms' is not a range, in --diffusion"),
-    (["camera.csv", "--against", "absent.csv"], "cannot read absent.csv"),
+    (["camera.csv", "--against", "absent.csv"], "absent.csv cannot be read"),
     (["camera.csv", "--out", "camera.csv"], "camera.csv is a file that is read"),
     (["grains.dump"], "the times of the frames are not known"),
     (["grains.dump", "--time-step", "1e-5", "--frames", "3"], "have one frame, displacements need two"),

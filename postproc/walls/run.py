@@ -156,8 +156,9 @@ def wall_lines(one: WallStress, source: Source) -> list[str]:
         lines.append(f"  note: {100.0 * share:.2g} % of the force acts outside the patches")
     if len(one.peak_forces):
         top = one.peak_forces.max()
+        mean = float(one.normal_force.mean())
         lines.append(f"  peaks of the normal force: {len(one.peak_forces)}, mean {one.peak_forces.mean():.4g} N, largest {top:.4g} N"
-                     f" ({top / max(one.normal_force.mean(), 1e-300):.3g} times its mean)")
+                     + (f" ({top / mean:.3g} times its mean)" if mean > 0.0 else ""))
     if one.peak_stress.number:
         lines.append(f"  peaks of a patch's normal stress: {one.peak_stress.number}, mean {_pressure(one.peak_stress.mean)}, 99 % below "
                      f"{_pressure(one.peak_stress.quantile(0.99))}, largest {_pressure(one.peak_stress.largest)}")

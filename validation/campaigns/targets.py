@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Iterator, Mapping
@@ -13,6 +12,7 @@ from typing import Any
 
 from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
+from dembark.common.tables import read_table
 from dembark.common.units import to_si
 from dembark.validation.judge.result import PLAN
 
@@ -77,13 +77,7 @@ class Table:
 
 def table(path: Path, where: Mapping[str, Any]) -> Table:
     """The rows of the CSV file `path` whose columns have the texts, or equal the numbers, of `where`; DembarkError when there are none."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            rows = [(reader.line_num, row) for row in reader]
-            names = list(reader.fieldnames or ())
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DembarkError(f"{path} cannot be read", str(error)) from None
+    names, rows = read_table(path)
     for key in where:
         if key not in names:
             raise DembarkError(f"{path} has no column {key!r}", "", nearest(key, names))

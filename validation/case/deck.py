@@ -11,6 +11,7 @@ import sys
 import traceback
 from collections.abc import Mapping
 from functools import cache
+from numbers import Integral, Real
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -78,8 +79,14 @@ def _setup_module(path: Path) -> ModuleType:
 
 def prepare(case: Case, values: Mapping[str, Value]) -> Setup:
     """Derived numbers, packing and meshes of a run with the parameters `values`; DembarkError with file and line when they cannot be
-    made, or when the run would never end."""
+    made, or when the run would have no step or never end."""
     setup = _prepared(case, values)
+    for name, value, kind, right in (("steps", setup.steps, Integral, "an integer of at least 1"),
+                                     ("time_step", setup.time_step, Real, "a positive number of seconds")):
+        if not isinstance(value, kind) or not 0 < value < math.inf:
+            own = case.folder / "setup.py"
+            raise DembarkError(f"{name} = {value!r} of a run of case {case.name}", f"from {own if own.is_file() else '[derived]'}",
+                               f"it must be {right}: is a time of the run too short?")
     if setup.steps > MOST_STEPS:
         raise DembarkError(f"a run of case {case.name} would have 1e{math.log10(setup.steps):.0f} steps",
                            f"it may have {MOST_STEPS:.0e}", "take shorter times")

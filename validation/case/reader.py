@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -167,12 +168,18 @@ class CaseReader(TableReader):
         found: dict[str, dict[str, Value]] = {}
         for name, entry in tables.items():
             table = f"{kind}.{name}"
+            self.folder_name(table, name)
             if not isinstance(entry, dict):
                 raise self.fail(table, f"{entry!r} is not a table", "overrides are a table of key = value")
             base = found[self.pick(str(entry["like"]), found, kind[:-1], table)] if "like" in entry else {}
             own = {self.pick(key, parameters, "parameter", table): value for key, value in entry.items() if key != "like"}
             found[name] = base | {key: self.value(table, parameters[key], value) for key, value in own.items()}
         return found
+
+    def folder_name(self, table: str, name: str) -> None:
+        """DembarkError unless `name` can be that of a folder of results."""
+        if not re.fullmatch(r"\w[\w.+=-]*", name):
+            raise self.fail(table, f"{name!r} is not a name of a folder", "give letters, digits, '_', '.', '+', '=' and '-'")
 
     def runs(self, data: Mapping[str, Any], case: Case) -> dict[str, tuple[PlannedRun, ...]]:
         """[runs]: what each profile of `case` runs; where an entry names no engines, in all that are capable of it."""
@@ -217,6 +224,7 @@ class CaseReader(TableReader):
     def study(self, name: str, entry: Any, parameters: Mapping[str, Parameter], variants: Mapping[str, Any]) -> Study:
         """[studies.NAME]: variants along a parameter."""
         table = f"studies.{name}"
+        self.folder_name(table, name)
         rest, order = entry, None
         if isinstance(entry, Mapping):
             rest, order = {key: value for key, value in entry.items() if key != "formal_order"}, self.order(table, entry, parameters)

@@ -27,7 +27,7 @@ _WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true o
 def load_toml(path: Path) -> dict[str, Any]:
     """Content of a TOML file; DembarkError naming the line when it is none."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         raise DembarkError(f"{path} cannot be read", str(error)) from None
 

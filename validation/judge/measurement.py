@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -11,6 +11,7 @@ from dembark.common.errors import DembarkError, RunError
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Measurement, Value
 from dembark.postproc.replica import Replica
+from dembark.postproc.statistics import Estimate
 from dembark.validation.case import deck
 from dembark.validation.case.model import Case, Study
 
@@ -34,7 +35,7 @@ def measure(case: Case, replicas: Sequence[Replica]) -> Measurement:
     try:
         return _checked(case, "measure", load(case).measure(replicas))
     except DumpError as error:
-        raise RunError(f"a run of case {case.name} could not be measured", str(error)) from None
+        raise RunError(f"a run of case {case.name} could not be measured", str(error), "to run it again, delete its folder") from None
 
 
 def study(case: Case, planned: Study, points: Sequence[Mapping[str, Any]]) -> Measurement:
@@ -56,7 +57,43 @@ def _checked(case: Case, function: str, found: Any) -> Measurement:
     if not isinstance(found, Measurement):
         raise DembarkError(f"{function} of {_path(case)} returned {type(found).__name__}", "",
                            "return a Measurement, see docs/how-to/cases.md")
-    if wrong := next((f"{key} = {value!r}" for key, value in found.values.items() if not isinstance(value, Value)), ""):
-        raise DembarkError(f"{function} of {_path(case)} returned {wrong}", "",
-                           "give a Value with an Estimate, see docs/how-to/cases.md")
+    where = f"{function} of {_path(case)} returned"
+    for name, value in found.values.items():
+        for wrong, right in _faults(value):
+            raise DembarkError(f"{where} {name} {wrong}", "", f"give {right}, see docs/how-to/cases.md")
+    if isinstance(found.remarks, str):
+        raise DembarkError(f"{where} one text as remarks", "", "give a list of texts")
+    if not all(isinstance(one, Mapping) and {"name", "place", "value"} <= one.keys() for one in found.profiles):
+        raise DembarkError(f"{where} profiles that are no curves", "", "make each with profile(name, ...)")
+    names = [one["name"] for one in found.profiles]
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        raise DembarkError(f"{where} two curves called {twice}", "", "give each a name of its own")
     return found
+
+
+def _faults(value: Any) -> Iterator[tuple[str, str]]:
+    """What is wrong with a measured value, each with what would be right."""
+    if not isinstance(value, Value):
+        yield f"= {value!r}", "a Value with an Estimate"
+        return
+    for part, one in (("estimate", value.estimate), *([("reference", value.reference)] if value.reference is not None else [])):
+        if not isinstance(one, Estimate):
+            yield f"with the {part} {one!r}", "an Estimate, such as Estimate(0.8, 0.0)"
+        elif not (_is_number(one.value) and _is_number(one.half)):
+            yield f"with the {part} {one.value!r} ± {one.half!r}", "a real number and a half-width"
+        elif one.half < 0.0:
+            yield f"with the {part} {one.value:g} ± {one.half:g}", "a half-width of 0 or more"
+    for part in ("half", "bound"):
+        if (given := getattr(value, part)) is not None and not _is_number(given):
+            yield f"with {part} = {given!r}", "a real number"
+    for part in ("reason", "inapplicable", "verdict", "detail"):
+        if not isinstance(given := getattr(value, part), str):
+            yield f"with {part} = {given!r}", "a text"
+
+
+def _is_number(one: Any) -> bool:
+    try:
+        float(one)
+    except (TypeError, ValueError):
+        return False
+    return not isinstance(one, str)

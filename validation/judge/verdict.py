@@ -68,6 +68,8 @@ def judged(one: Declared, value: Value, name: str = "", part: str = "") -> Quant
         verdict = "info"
         if not reason and tolerance is not None and deviation is not None:
             verdict, reason = judge(deviation, half, tolerance)
+            if reference is not None and reference.value == 0.0 and math.isnan(scale):
+                reason = "the reference is 0, of which there are no parts: declare absolute = true, with a tolerance in the unit"
             if verdict == "info":
                 known = "inputs" if one.input_uncertainty > of_reference else "a reference"
                 decided = decides(deviation, own, math.hypot(of_reference, one.input_uncertainty), tolerance, value.estimate.basis, known)

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from dembark.common.errors import DembarkError
+from dembark.common.errors import DembarkError, pasteable
 from dembark.common.lock import lock
 from dembark.common.parallel import cores_here
 from dembark.common.units import duration, size_text
@@ -145,10 +145,11 @@ def _submit(plan: Plan, file: Path, target: Path, chosen: Options, where: site.S
         elif cancel:
             outcome = workflow.perform(plan, target, cancel, _cores(chosen), _memory(), target / folder.LOG, expected)
     if where:
-        for line in (*lines, f"see 'dembark status {target}'; what ended too early is submitted again by 'dembark resume {target}'"):
+        again = pasteable("dembark", "resume", target)
+        for line in (*lines, f"see {pasteable('dembark', 'status', target)}; what ended too early is submitted again by {again}"):
             print(f"dembark: {line}", file=sys.stderr)
     else:
-        show.show_outcome(outcome, "the campaign", f"go on with 'dembark resume {target}': what is finished is kept")
+        show.show_outcome(outcome, "the campaign", f"go on with {pasteable('dembark', 'resume', target)}: what is finished is kept")
 
 
 @app.command()
@@ -166,8 +167,11 @@ def status(directory: Folder) -> None:
     show.print_tally(console, found.tally, f"{found.measured} series measured; ")
     if found.report:
         console.print(str(found.report), markup=False, soft_wrap=True)
-    if not found.running and not found.complete:
-        console.print(f"go on with 'dembark resume {directory}'", markup=False, soft_wrap=True)
+    if not found.running and not found.concluded:
+        lacking = "measurements or the report are missing: " if found.complete else ""
+        if folder.options(directory.resolve()).executor != "local":
+            lacking += "unless its jobs wait in the queue of the cluster, "
+        console.print(f"{lacking}go on with {pasteable('dembark', 'resume', directory)}", markup=False, soft_wrap=True)
 
 
 @app.command()

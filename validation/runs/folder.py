@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from dembark.common.errors import DembarkError
+from dembark.common.errors import DembarkError, pasteable
 from dembark.common.files import write_atomic, write_json
 from dembark.common.lock import is_held
 from dembark.validation import engines, provenance, results
@@ -164,13 +164,18 @@ class Status:
         """Whether every run is finished."""
         return all(state.state == "finished" for state in self.states)
 
+    @property
+    def concluded(self) -> bool:
+        """Whether every run is finished and measured, and there is a report."""
+        return self.complete and self.measured == len({Path(state.folder).parent for state in self.states}) and self.report is not None
+
 
 def look(folder: Path) -> Status:
     """The state of the campaign in `folder`, from its files alone; DembarkError when it is not a campaign's."""
     own_file(folder)
     states = tuple(results.states(folder))
     if not states:
-        raise DembarkError(f"the campaign in {folder} has not been started", "", f"start it with 'dembark resume {folder}'")
+        raise DembarkError(f"the campaign in {folder} has not been started", "", f"start it with {pasteable('dembark', 'resume', folder)}")
     running = is_held(folder / LOCK) or any(state.state == "running" for state in states)
     report = folder / "report.html"
     measured = {Path(state.folder).parent for state in states if (folder / state.folder).with_name(METRICS).is_file()}

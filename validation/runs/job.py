@@ -4,6 +4,7 @@ names, or measures what is finished and writes the report."""
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 import threading
 from collections.abc import Sequence
@@ -42,7 +43,8 @@ def _simulate(folder: Path, place: str, again: bool, cancel: threading.Event) ->
     plan = expand.campaign(read(folder / CAMPAIGN_FILE), (case,), (engine,))
     run = plan.folders.get(place)
     if run is None or run.inputs != state.inputs:
-        raise DembarkError("the inputs have changed since the job was submitted", place, f"submit again: dembark resume {folder}")
+        raise DembarkError("the inputs have changed since the job was submitted", place,
+                           f"submit again: {shlex.join(['dembark', 'resume', str(folder)])}")
     try:
         simulate(run, (folder / place).parent, cancel, plan.resources[Path(place).parent])
     except Busy as error:

@@ -69,12 +69,46 @@ def test_an_error_in_a_measurement_is_told_with_its_line(tmp_path: Path) -> None
         assert analysis.reasons(tmp_path, caught.value, case) == (f"{tmp_path / 'measure.py'}, line 2, {line}",)
 
 
-def test_a_number_in_the_place_of_a_value_is_refused(tmp_path: Path) -> None:
+PAIR = "Value(Estimate(0.8, 0.0), Estimate(0.8, 0.0)"
+CURVE = "profile('h', 'Height', 't', 'h', [0.0, 1.0], [[1.0, 2.0]])"
+
+
+@pytest.mark.parametrize(("returned", "words"), [
+    ("Measurement({'rebound': 0.8})", "returned rebound = 0.8, give a Value with an Estimate"),
+    ("Measurement({'rebound': Value(0.8)})", "returned rebound with the estimate 0.8, give an Estimate, such as"),
+    ("Measurement({'rebound': Value(Estimate(0.8, 0.0), 0.8)})", "returned rebound with the reference 0.8, give an Estimate"),
+    ("Measurement({'rebound': Value(Estimate('0.8', 0.0))})", "with the estimate '0.8' ± 0.0, give a real number"),
+    ("Measurement({'rebound': Value(Estimate(0.8j, 0.0))})", "with the estimate 0.8j ± 0.0, give a real number"),
+    ("Measurement({'rebound': Value(Estimate([0.8], 0.0))})", "with the estimate [0.8] ± 0.0, give a real number"),
+    ("Measurement({'rebound': Value(Estimate(0.8, -0.1))})", "with the estimate 0.8 ± -0.1, give a half-width of 0 or more"),
+    (f"Measurement({{'rebound': {PAIR}, reason=3)}})", "returned rebound with reason = 3, give a text"),
+    (f"Measurement({{'rebound': {PAIR}, half='x')}})", "returned rebound with half = 'x', give a real number"),
+    ("Measurement({}, remarks='two frames')", "returned one text as remarks, give a list of texts"),
+    ("Measurement({}, [{'x': 1}])", "returned profiles that are no curves, make each with profile"),
+    (f"Measurement({{}}, [{CURVE}, {CURVE}])", "returned two curves called h, give each a name of its own"),
+    (f"Measurement({{}}, [{CURVE.replace('2.0', '2.0, 3.0')}])", "the curve h has 2 places, but 3 values"),
+    (f"Measurement({{}}, [{CURVE.replace('[[1.0, 2.0]]', '[1.0, 2.0]')}])", "the curve h has 2 places, but one number, one number values"),
+    (f"Measurement({{}}, [{CURVE.replace('2.0]])', '2.0]], reference=[1.0])')}])", "the curve h has 2 places, but 2, 1 values"),
+    (f"Measurement({{}}, [{CURVE.replace('[[1.0, 2.0]]', '[]')}])", "the curve h has 2 places, but no values"),
+    (f"Measurement({{}}, [{CURVE.replace('h', 'a/h', 1)}])", "a curve is called 'a/h', files are named after it"),
+])
+def test_what_cannot_be_judged_or_drawn_is_refused(returned: str, words: str, tmp_path: Path) -> None:
     case = SimpleNamespace(name="mine", folder=tmp_path, studies=())
-    (tmp_path / "measure.py").write_text("from dembark.postproc.measurement import Measurement\n\n"
-                                         "def measure(replicas):\n    return Measurement({'rebound': 0.8})\n")
-    with pytest.raises(DembarkError, match=r"measure of .*measure\.py returned rebound = 0\.8, give a Value with an Estimate"):
+    (tmp_path / "measure.py").write_text("from dembark.postproc.measurement import Estimate, Measurement, Value, profile\n\n"
+                                         f"def measure(replicas):\n    return {returned}\n")
+    with pytest.raises(DembarkError) as caught:
         measurement.measure(case, [])
+    assert words in str(caught.value), str(caught.value)
+
+
+def test_a_measurement_in_order_passes(tmp_path: Path) -> None:
+    case = SimpleNamespace(name="mine", folder=tmp_path, studies=())
+    (tmp_path / "measure.py").write_text(
+        "import numpy as np\nfrom dembark.postproc.measurement import Estimate, Measurement, Value, profile\n\n"
+        f"def measure(replicas):\n    one = {CURVE.replace('2.0]])', '2.0]], reference=np.ones(2), reference_half=0.1)')}\n"
+        "    return Measurement({'a': Value(Estimate(np.float32(0.8), np.inf)), 'b': Value(Estimate(np.nan, np.nan))}, [one], ['said'])\n")
+    found = measurement.measure(case, [])
+    assert set(found.values) == {"a", "b"} and found.profiles[0]["reference_low"] == [0.9, 0.9]
 
 
 def test_numerical_warnings_become_remarks_and_stay_errors_where_they_are(capsys: pytest.CaptureFixture[str]) -> None:

@@ -177,6 +177,33 @@ def test_misspelt_names_of_an_own_case(file: str, old: str, new: str, expected: 
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(("key", "value", "words"), [
+    ("steps", "0", "steps = 0 of a run of case mine, from [derived], it must be an integer of at least 1"),
+    ("steps", "0.4", "steps = 0 of"), ("steps", "-5", "steps = -5 of"), ("time_step", "-1e-5", "time_step = -1e-05 of a run of case mine"),
+    ("time_step", "0 * height", "time_step = 0.0 of a run of case mine, from [derived], it must be a positive number of seconds"),
+])
+def test_a_run_without_a_step_is_refused(key: str, value: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("DEMBARK_CASES", str(tmp_path / "cases"))
+    assert main(["new-case", "mine", "--in", str(tmp_path / "cases")]) == 0
+    file = tmp_path / "cases/mine/case.toml"
+    before, _, after = file.read_text().partition("[derived]")
+    numbers = {"time_step": "1e-5", "stride": "10", "steps": "500", key: value}
+    lines = "".join(f'{name} = "{one}"\n' for name, one in numbers.items())
+    file.write_text(f"{before}[derived]\n{lines}\n{after[after.index('[quantities]'):]}")
+    capsys.readouterr()
+    refused(("deck", "mine", "--engine", "liggghts", "--out", "out"), words, capsys)
+
+
+@pytest.mark.parametrize(("steps", "words"), [("0", "steps = 0 of a run of case mine, from"), ("100.5", "steps = 100.5 of"),
+                                              ("'100'", "steps = '100' of"), ("float('nan')", "steps = nan of")])
+def test_a_set_up_without_a_step_is_refused(steps: str, words: str, own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (own / "setup.py").write_text("from dembark.input_decks.common.setup import Setup\n\n\n"
+                                  f"def setup(p):\n    return Setup(steps={steps}, time_step=1e-5)\n")
+    capsys.readouterr()
+    refused(("deck", "mine", "--engine", "liggghts", "--out", "out"), words, capsys)
+
+
 @pytest.mark.parametrize("place", ['Path(__file__).with_name("reference") / "film.csv"',
                                    'HERE / "reference/film.csv"', 'HERE.joinpath("film.csv")'])
 @pytest.mark.parametrize("content", [
@@ -197,6 +224,26 @@ def test_a_table_that_cannot_be_read_is_reported_before_a_run(place: str, conten
         deck.require_measure(box)
     assert content != b"time,x\n0,5,1\n" or "line 2, has 3 fields, the header 2" in str(caught.value)
     assert all(word in str(caught.value) for word in ("film.csv", f"{module}, line 3"))
+
+
+@pytest.mark.parametrize(("table", "words"), [
+    ('[variants]\n"../x" = {}', "'../x' is not a name of a folder, [variants.../x]"), ('[variants]\n"a/b" = {}', "'a/b' is not a name"),
+    ('[variants]\n".hidden" = {}', "'.hidden' is not a name"), ('[variants]\n"a b" = {}', "'a b' is not a name"),
+    ('[profiles]\n"../x" = {}', "'../x' is not a name of a folder, [profiles.../x]"),
+    ('[studies]\n"a/b" = { title = "t", along = "restitution", variants = ["a", "b", "c"] }', "'a/b' is not a name of a folder"),
+])
+def test_what_cannot_be_a_folder_of_results_is_refused(table: str, words: str, own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its results would lie elsewhere, where no report looks for them."""
+    with (own / "case.toml").open("a") as file:
+        file.write(f"\n{table}\n")
+    capsys.readouterr()
+    refused(("cases", "mine"), words, capsys)
+
+
+def test_a_file_with_the_mark_that_some_editors_put_first(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = own / "case.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes())
+    assert main(["cases", "mine"]) == 0 and "mine: grains settle on a floor" in capsys.readouterr().out
 
 
 def test_own_decks_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -144,6 +144,13 @@ def test_nan_fails():
     assert as_json(broken)["value"] is None
 
 
+def test_a_reference_of_zero_has_no_relative_deviation():
+    declared = Declared("q", "q", tolerance=0.1)
+    broken = judged(declared, Value(Estimate(0.05, 0.0), Estimate(0.0, 0.0)))
+    assert broken.verdict == "fail" and "the reference is 0" in broken.reason and "absolute = true" in broken.reason
+    assert judged(replace(declared, absolute=True), Value(Estimate(0.05, 0.0), Estimate(0.0, 0.0))).verdict == "pass"
+
+
 def test_a_bound_that_is_not_finite_is_none_in_the_file() -> None:
     """A column too small for an interval allows anything; JSON has no number for that."""
     entry = as_json(judged(Declared("field_balance", "balance", tolerance=math.inf, absolute=True),

@@ -6,6 +6,7 @@ In the plane (positions with two components) masses, forces and energies are tho
 
 from __future__ import annotations
 
+import warnings
 from typing import NamedTuple
 
 import numpy as np
@@ -237,6 +238,15 @@ class SphBody:
                               self._turn("torque", still if torque is None else torque, "N m"))
 
 
+def _check_spacing(points: NDArray[np.float64], spacing: float) -> None:
+    """UserWarning when particles at `points` (n, 3) do not lie about one `spacing` (m) apart: the mass of each follows from it."""
+    from scipy.spatial import cKDTree
+    apart = float(np.median(cKDTree(points).query(points, 2)[0][:, 1])) / spacing
+    if not 0.75 < apart < 1.35:
+        warnings.warn(f"the particles of the fluid lie {apart:.3g} spacings apart (median of the nearest); the mass of each is that of one "
+                      "spacing: give the spacing of their lattice", stacklevel=3)
+
+
 class SphFluid:
     """Weakly compressible fluid with walls and rigid bodies.
 
@@ -262,8 +272,8 @@ class SphFluid:
     skin : over h, how far beyond the support neighbours are searched
     slit_pressure : share of the pressure around it that a film has between faces of boxes or on a plane; see :meth:`add_box`
 
-    Raises ValueError for arguments out of range and, from `run` and `state`, when particles of fluid overlap others at the beginning,
-    RuntimeError from `run` when the fluid blows up.
+    A UserWarning says that the particles do not lie one spacing apart. Raises ValueError for arguments out of range and, from `run` and
+    `state`, when particles of fluid overlap others at the beginning, RuntimeError from `run` when the fluid blows up.
 
     >>> water = SphFluid(lattice([0, 0], [0.4, 0.2], 0.02), spacing=0.02, sound_speed=30.0, gravity=[0, -9.81])
     >>> floor = water.add_wall(tank_walls([0, 0], [0.4, 0.2], 0.02))
@@ -300,6 +310,8 @@ class SphFluid:
             points, densities, velocities, self._dimension, spacing, smoothing, kernel, density, sound_speed, gamma, tension, alpha, delta,
             np.append(weight, 0.0)[:3].tolist(), boundary, no_slip, shifting, contact_stiffness, contact_exponent, skin, threads,
             slit_pressure, xsph, shepard, moment, instruction_set)
+        if n > 1:
+            _check_spacing(points, self._spacing)
 
     def add_wall(self, points: ArrayLike) -> SphBody:
         """A wall of particles at `points` (m, (k, d)), at rest until its `set_motion`; torques and turns are about the origin."""

@@ -159,11 +159,13 @@ def _complete(sample: Sample, engine: str, points: Sequence[Point]) -> tuple[lis
         measured = {each["name"]: each for point in points if engine in point.results for each in point.results[engine].profiles}
         if measured and name not in measured:
             return [], f"the case measures no curve {name}, but {', '.join(measured)}"
-        place = [number for number in measured.get(name, {}).get("place", ()) if number is not None]
-        if place and (one.at[0] < min(place) or one.at[-1] > max(place)):
-            return [], (f"the target {name} reaches from {one.at[0]:g} to {one.at[-1]:g}, what is measured from {min(place):g} to "
-                        f"{max(place):g}: leave out the places beyond")
-    complete = [point for point in points if all(point.curve(engine, name) if name in curves else point.quantity(engine, name)
+        # Of every point: places may depend on the parameters, and a curve may have no values at its ends.
+        known = [pairs for point in points if (pairs := _known(point.curve(engine, name)))]
+        low, high = max((pairs[0][0] for pairs in known), default=-np.inf), min((pairs[-1][0] for pairs in known), default=np.inf)
+        if one.at[0] < low or one.at[-1] > high:
+            return [], (f"the target {name} reaches from {one.at[0]:g} to {one.at[-1]:g}, what is measured at all points from {low:g} to "
+                        f"{high:g}: leave out the places beyond")
+    complete = [point for point in points if all(_known(point.curve(engine, name)) if name in curves else point.quantity(engine, name)
                                                  for name in sample.targets)]
     least = LEAST_POINTS * len(sample.variables)
     enough = len(complete) >= least
@@ -205,8 +207,13 @@ def of_curve(name: str, target: CurveTarget, places: Array,
 
 def _at(measured: Mapping[str, Any], places: Array) -> Array:
     """The measured curve at `places`."""
-    pairs = sorted((x, y) for x, y in zip(measured["place"], measured["value"], strict=True) if x is not None and y is not None)
-    return np.interp(places, *np.array(pairs).T)
+    return np.interp(places, *np.array(_known(measured)).T)
+
+
+def _known(measured: Mapping[str, Any] | None) -> list[tuple[float, float]]:
+    """Places of a measured curve, ascending, that have a value, with it."""
+    pairs = zip(measured["place"], measured["value"], strict=True) if measured else ()
+    return sorted((x, y) for x, y in pairs if x is not None and y is not None)
 
 
 def _curves(known: Posterior, outputs: Sequence[Output],

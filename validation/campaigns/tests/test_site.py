@@ -48,7 +48,7 @@ def test_a_site_that_is_not_there_and_the_examples() -> None:
 
 
 EXPECTED = {
-    "slurm": ["#SBATCH --ntasks=3", "#SBATCH --mem=500M", "#SBATCH --time=10", "#SBATCH --array=0-4%7",
+    "slurm": ['#SBATCH --output="/log"', "#SBATCH --ntasks=3", "#SBATCH --mem=500M", "#SBATCH --time=10", "#SBATCH --array=0-4%7",
               "#SBATCH --dependency=afterany:11:12"],
     "pbs": ["#PBS -l select=1:ncpus=6:mpiprocs=3:mem=500mb", "#PBS -l walltime=590", "#PBS -J 0-5%7", "#PBS -W depend=afterany:11:12"],
     "lsf": ['#BSUB -J "job[1-5]%7"', "#BSUB -n 6", "#BSUB -W 10", '#BSUB -w "ended(one) && ended(two)"'],

@@ -49,7 +49,7 @@ class Campaign:
     """A campaign file, its folder, and `dembark` on it."""
 
     def __init__(self, folder: Path, environment: dict[str, str], cluster: Cluster) -> None:
-        self.folder, self.file, self.results, self.cluster = folder, folder / "sizes.toml", folder / "results", cluster
+        self.folder, self.file, self.results, self.cluster = folder, folder / "sizes.toml", folder / "a user's results", cluster
         self.environment = environment
         self.file.write_text(CAMPAIGN)
         text = (site.SHIPPED / "slurm.toml").read_text()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import tempfile
 import time
 from pathlib import Path
@@ -88,6 +89,61 @@ def test_status_counts_checks_by_kind_of_evidence(results: Path, capsys: pytest.
     assert lines[lines.index("1 series measured; 1 of 2 checks passed, 1 FAILED") + 1 :][:2] == [
         "  experiment (measured values): 0 of 1 check passed, 1 FAILED",
         "  identity (conservation laws, the scheme against itself): 1 of 1 check passed, none failed"]
+
+
+def test_status_says_that_measurements_or_the_report_are_missing(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for number in (12, 21, 22):
+        place = results / f"box/n={number // 10}/yade/replica-{number % 10}"
+        place.mkdir(parents=True)
+        (place / "run.json").write_text(json.dumps({"inputs": str(number), "steps": 100, "case": "box"}))
+    hint = f"measurements or the report are missing: go on with 'dembark resume {results}'"
+    for n in (1, 2):
+        assert main(["status", str(results)]) == 0 and hint in capsys.readouterr().out
+        write(results / f"box/n={n}/yade/metrics.json", Result("box", f"n={n}", "yade", CHECKS))
+    assert look(results).complete and main(["status", str(results)]) == 0 and hint in capsys.readouterr().out
+    (results / "report.html").touch()
+    assert main(["status", str(results)]) == 0 and "resume" not in capsys.readouterr().out
+
+
+def test_jobs_that_wait_in_a_queue_need_no_second_submission(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan = json.loads((results / "plan.json").read_text())
+    for executor in ("local", "slurm"):
+        (results / "plan.json").write_text(json.dumps(plan | {"submitted": {"options": {"executor": executor}}}))
+        assert main(["status", str(results)]) == 0
+        assert ("unless its jobs wait in the queue of the cluster, go on with" in capsys.readouterr().out) == (executor == "slurm")
+
+
+def test_the_command_of_a_hint_can_be_pasted(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    moved = tmp_path / "with a space"
+    moved.mkdir()
+    for name in (CAMPAIGN_FILE, "plan.json"):
+        (results / name).rename(moved / name)
+    assert main(["status", str(moved)]) == 0
+    hint = capsys.readouterr().out.partition("go on with ")[2].strip()
+    assert shlex.split(hint[1:-1]) == ["dembark", "resume", str(moved)]
+
+
+def test_a_clock_that_is_ahead_leaves_no_negative_time(results: Path) -> None:
+    status(results, 12, state="running", began=time.time() + 500.0, step=60, steps=100, resumed_from=10)
+    with lock(lock_file(results / "box/n=1/yade/replica-2"), "held"):
+        assert look(results).states[1].left == 0.0
+
+
+def test_a_result_that_was_cut_off_is_not_left_out_of_a_table(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for n in (1, 2):
+        (results / f"box/n={n}/yade").mkdir(parents=True, exist_ok=True)
+        write(results / f"box/n={n}/yade/metrics.json", Result("box", f"n={n}", "yade", CHECKS))
+    path = results / "box/n=2/yade/metrics.json"
+    path.write_text(path.read_text()[:100])
+    assert main(["export", str(results)]) == 1
+    assert f"{path} cannot be read, it holds no JSON, measure it again" in capsys.readouterr().err
+
+
+def test_a_folder_below_superseded_is_read_and_one_below_it_is_not(results: Path, tmp_path: Path) -> None:
+    for place in ("superseded/own/replica-1", "superseded/own/superseded/replica-2", "superseded/own/.old/yade/replica-3"):
+        (tmp_path / place).mkdir(parents=True)
+        (tmp_path / place / "run.json").write_text(json.dumps({"inputs": "1", "case": "box"}))
+    assert list(tables.runs(tmp_path / "superseded/own")["folder"]) == ["replica-1"]
 
 
 def test_tables_hold_every_run_and_quantity(results: Path) -> None:

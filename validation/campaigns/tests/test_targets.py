@@ -95,6 +95,18 @@ def test_a_mistake_gets_one_line(line: str, expected: str, capsys: pytest.Captur
     assert error.count("\n") == 1 and expected in error.replace(", a quantity", ": a quantity"), error
 
 
+@pytest.mark.parametrize(("table", "expected"), [
+    ("angle,error\n30,5,0,5\n", "line 2, has 4 fields: the header 2"), ("angle;error\n30,5;0,5\n", "has 3 fields: the header 1"),
+    ("angle;error\n30;0.5\n", "has no column 'angle'"), ("angle,error,angle\n30,1,40\n", "has two columns 'angle'"),
+])
+def test_a_table_that_would_be_misread_gets_one_line(table: str, expected: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.csv").write_text(table, encoding="utf-8")
+    Path("campaign.toml").write_text(CAMPAIGN + ROW.replace("where = { speed = 1 }, ", "") + "\n", encoding="utf-8")
+    assert main(["calibrate", "campaign.toml", "--dry-run"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and expected in error.replace(", the", ": the"), error
+
+
 @pytest.mark.parametrize(("given", "expected"), [
     ("grain_diameter = 5", "5 is not a range"), ('grain_diameter = { min = "4 mm" }', "grain_diameter has no max"),
     ('grain_diameter = { min = "8 mm", max = "4 mm" }', "min = 0.008 of grain_diameter is not below max = 0.004")])

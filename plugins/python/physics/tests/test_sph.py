@@ -1,5 +1,7 @@
 """The SPH solver from Python: kernels and state beside their definitions, one result on any processor and thread, bodies, input."""
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -241,6 +243,18 @@ def test_wrong_use_gets_one_line():
     fast = SphFluid([[0.0, 0.0]], spacing=DX, sound_speed=20.0, velocity=[25.0, 0.0])
     with pytest.raises(RuntimeError, match="faster than sound"):
         fast.run(1e-3)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_particles_that_are_not_one_spacing_apart_are_told(factor):
+    """The mass of each follows from the spacing: another one makes another fluid."""
+    points = lattice([0, 0], [0.2, 0.2], DX)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        SphFluid(points, spacing=DX, sound_speed=25.0)
+        SphFluid(points[:1], spacing=DX, sound_speed=25.0)
+    with pytest.warns(UserWarning, match=f"lie {1.0 / factor:.3g} spacings apart"):
+        SphFluid(points, spacing=factor * DX, sound_speed=25.0)
 
 
 def test_what_is_put_into_the_fluid_is_told():

@@ -152,16 +152,23 @@ def test_a_curve_as_target(tmp_path: Path) -> None:
     text = CAMPAIGN.replace(targets, 'surface = { file = "own.csv", at = "x", value = "y", uncertainty = 0.03, correlation = 0.2 }\n')
     spec, facts, found = measured(tmp_path, lambda x: (x[0], x[1]), text)
 
-    def fitted(name: str = "surface", width: float = 1.0) -> calibration.Fit:
-        pages = [Page(one.case, one.variant, Path(), results={one.engine: replace(one, profiles=({"name": name, "place": list(
-            width * PLACES), "value": list(lines(*point.quantiles))},))}) for one, point in zip(found, points(spec), strict=True)]
+    def fitted(name: str = "surface", width: float = 1.0, short: int = 0, empty: int = 0) -> calibration.Fit:
+        """`short`: how many points have half of this `width`; `empty`: how many have no value at the last place."""
+        pages = []
+        for number, (one, point) in enumerate(zip(found, points(spec), strict=True)):
+            place, value = width * (0.5 if number < short else 1.0) * PLACES, list(lines(*point.quantiles))
+            curve = {"name": name, "place": list(place), "value": [*value[:-1], None if number < empty else value[-1]]}
+            pages.append(Page(one.case, one.variant, Path(), results={one.engine: replace(one, profiles=(curve,))}))
         return calibration.fits(sweeps(facts["sweeps"], pages, folders.discover())[0], spec.sweeps[0])[0]
 
     right = fitted()
     assert right.parameters[0].low < 0.2 + 0.6 * 0.4 < right.parameters[0].high
     assert right.curves[0][1] < 0.5 and "standard uncertainties" in right.words[-2] and "reach" not in right.words[-2]
     assert fitted("outline").why == "the case measures no curve surface, but outline"
-    assert "reaches from -1 to 1, what is measured from -0.5 to 0.5" in fitted(width=0.5).why
+    assert "reaches from -1 to 1, what is measured at all points from -0.5 to 0.5" in fitted(width=0.5).why
+    # One point is enough: its curve would go on with its last value.
+    assert "what is measured at all points from -0.5 to 0.5" in fitted(short=1).why
+    assert "what is measured at all points from -1 to 0.9" in fitted(empty=1).why
 
 
 def test_the_report_has_the_fit_and_its_files(tmp_path: Path) -> None:
