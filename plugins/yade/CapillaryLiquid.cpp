@@ -39,6 +39,11 @@ Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz* lawOf(Scene& scene) {
 	fail("CapillaryLiquid: no InteractionLoop has a Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz with carriedLiquid=True");
 }
 
+/// Also of bodies that are no more: another one that stands in the same place in memory is not the same.
+bool same(const boost::weak_ptr<Body>& one, const boost::weak_ptr<Body>& other) {
+	return !one.owner_before(other) && !other.owner_before(one);
+}
+
 void checkVolume(const std::string& what, double volume) {
 	if (!(volume >= 0.0 && std::isfinite(volume)))
 		fail("CapillaryLiquid." + what + " is " + text(volume) + " m^3; it must be >= 0 and finite");
@@ -89,9 +94,9 @@ void CapillaryLiquid::registerNewBodies() {
 	bool come = false;
 	for (std::size_t id = 0; id < count; ++id) {
 		const shared_ptr<Body> body = bodyOf(id);
-		const bool             gone = seen[id] ? body != seen[id] : loaded && id < known && !body;
+		const bool             gone = same(seen[id], {}) ? loaded && id < known && !body : !same(seen[id], body);
 		if (loaded && id < known) seen[id] = body;
-		if (!gone && body == seen[id]) continue;
+		if (!gone && same(seen[id], body)) continue;
 		if (gone) {
 			ledger.remove(static_cast<int>(id), grains());
 			walls[id] = -1;

@@ -4,6 +4,8 @@
 #include <mutex>
 #include <vector>
 
+#include <boost/weak_ptr.hpp>
+
 #include <core/Body.hpp>
 #include <core/GlobalEngine.hpp>
 
@@ -100,7 +102,7 @@ private:
 	int wallNumber(Body::id_t body) const { return 1 + walls[body]; }
 
 	::dembark::capillary::LiquidLedger ledger;
-	std::vector<shared_ptr<Body>>      seen;  // by id; kept until the next step, so that no other stands in their place in memory
+	std::vector<boost::weak_ptr<Body>> seen;              // by id; to own it could mean to end a Python object without the interpreter
 	bool                               vanished = false;  // bodies, and maybe bridges with them
 };
 REGISTER_SERIALIZABLE(CapillaryLiquid);
