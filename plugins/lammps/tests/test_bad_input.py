@@ -77,6 +77,18 @@ def test_one_line_says_what_is_wrong(tmp_path, deck, old, new, words):
     assert_one_line(lammps_driver.run_deck(tmp_path, deck.replace(old, new, 1)), *words)
 
 
+@pytest.mark.parametrize(("command", "words"), [
+    ("delete_atoms group gone", ("delete_atoms would give", "other numbers", "add 'compress no'")),
+    ("delete_atoms group gone compress yes", ("add 'compress no'",)),
+    ("reset_atoms id", ("reset_atoms id would give", "other numbers", "before the first run"))])
+def test_numbers_by_which_contacts_know_each_other_stay(tmp_path, deck, command, words):
+    assert_one_line(lammps_driver.run_deck(tmp_path, f"{deck}group gone empty\n{command}\nrun 1\n"), *words)
+    first = deck.replace("timestep", f"group gone empty\n{command}\ntimestep", 1)
+    for text in (first, f"{deck}group gone empty\ndelete_atoms group gone compress no\nrun 1\n"):
+        done = lammps_driver.run_deck(tmp_path, text)
+        assert done.code == 0, done.error
+
+
 def test_a_wall_needs_the_pair_style(tmp_path, deck):
     lines = [line for line in deck.splitlines() if not line.startswith(("pair_style", "pair_coeff"))]
     assert_one_line(lammps_driver.run_deck(tmp_path, "\n".join(lines) + "\n"), "fix floor wall/dembark", "pair_style dembark/granular")

@@ -150,3 +150,26 @@ def test_units_that_do_not_fit_together(tmp_path):
     """The engine refuses `real` and `metal`, but not these."""
     done = run(tmp_path, lambda deck: deck.replace("units si", "units electron"))
     assert_one_line(done, "units electron", "si, cgs, micro, nano or lj")
+
+
+def test_numbers_by_which_contacts_know_each_other_stay(tmp_path):
+    """Stock LIGGGHTS loses histories and bridges with them, and may find those of another pair."""
+    def with_end(end):
+        return lambda deck: f"{deck}group gone id 3\n{end}\nrun 1\n"
+
+    assert_one_line(run(tmp_path, with_end("delete_atoms group gone")), "delete_atoms would give", "other numbers", "'compress no'")
+    assert_one_line(run(tmp_path, with_end("delete_atoms group gone compress yes")), "add 'compress no'")
+    before = run(tmp_path, lambda deck: deck.replace("thermo", "group gone id 3\ndelete_atoms group gone\nthermo", 1))
+    for done in (before, run(tmp_path, with_end("delete_atoms group gone compress no"))):
+        assert done.code == 0, done.error
+
+
+def test_another_pair_style_after_a_run_is_warned_of(tmp_path):
+    def again(deck):
+        style = next(line for line in deck.splitlines() if line.startswith("pair_style"))
+        return f"{deck}{style}\npair_coeff * *\nrun 1\n"
+
+    done = run(tmp_path, again)
+    assert done.code == 0 and done.output.count("WARNING: pair_style gran: given again after a run") == 1, done.output[-2000:]
+    assert "given again" not in run(tmp_path / "once").output
+    assert "given again" not in run(tmp_path / "clear", lambda deck: f"{deck}clear\n{deck}").output
