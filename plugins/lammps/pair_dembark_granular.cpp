@@ -305,16 +305,15 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
     const double before = state.cohesion.bridge_volume;
     const ContactForce out = contact_step(p, b, update->dt, state, advance);
     if (dembark::has_no_direction(out.normal)) refuse_coincidence(i, j);
+    // The set-up looks at all of them: the skin may be a new one.
+    if (state.cohesion.held() && !(advance && was_held)) check_reach(i, j, state.cohesion.rupture_distance);
     if (advance) {
-      if (state.cohesion.held() && !was_held) {
-        dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
-        check_reach(i, j, state.cohesion.rupture_distance);
-      }
+      // In every step: a run may go on with a longer one.
+      if (state.cohesion.held() || (liquid_ && out.overlap > 0.0)) dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
       touches = out.interacting;
       layout_.store(row, state);
       if (liquid_) {
         if (!touched) row[layout_.imbalance_at()] = 0.0;
-        if (out.overlap > 0.0 && !was_held) dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
         liquid_->report({i, j, false}, atom->radius[i], atom->radius[j], p.cohesion.liquid, out.overlap > 0.0, before,
                         row + layout_.cohesion_at(), row + layout_.imbalance_at());
       }

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,15 @@ def test_the_deck_runs_as_it_is(tmp_path, deck):
 def test_one_line_says_what_is_wrong(tmp_path, deck, old, new, words):
     assert old in deck
     assert_one_line(lammps_driver.run_deck(tmp_path, deck.replace(old, new, 1)), *words)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ("neighbor 0.0001 bin", ("a bridge reaches", "neighbor skin is 0.0001", "use neighbor")),
+    ("timestep 1e-3", ("with viscous_liquid a bridge", "needs a timestep <=", "not 0.001"))])
+def test_a_bridge_of_the_run_before_does_not_fit_the_next_one(tmp_path, change, words):
+    case = Scenario(name="", material=replace(WET, viscosity=0.1, minimum_gap=1e-5), steps=10,
+                    grains=(Grain(position=(0.0, 0.0, 4.999e-3)), Grain(position=(0.0, 0.0, -5e-3))))
+    assert_one_line(lammps_driver.run_deck(tmp_path, f"{lammps_driver.deck(case)}{change}\nrun 10\n"), *words)
 
 
 @pytest.mark.parametrize(("command", "words"), [

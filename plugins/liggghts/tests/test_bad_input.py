@@ -1,5 +1,7 @@
 """A user's mistake ends the run with one line that says what is wrong, where, and what would be right."""
 
+from dataclasses import replace
+
 import pytest
 from rig import liggghts_driver
 from rig.scenarios import Grain, Material, Scenario
@@ -150,6 +152,15 @@ def test_units_that_do_not_fit_together(tmp_path):
     """The engine refuses `real` and `metal`, but not these."""
     done = run(tmp_path, lambda deck: deck.replace("units si", "units electron"))
     assert_one_line(done, "units electron", "si, cgs, micro, nano or lj")
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ("neighbor 0.0001 bin", ("a bridge", "neighbor")),
+    ("timestep 1e-3", ("with viscous_liquid on a bridge", "needs a time step <=", "not 0.001"))])
+def test_a_bridge_of_the_run_before_does_not_fit_the_next_one(tmp_path, change, words):
+    case = Scenario(name="on a wall", material=replace(WET, viscosity=0.1, minimum_gap=1e-5), steps=10, wall=True,
+                    grains=(Grain(position=(0.0, 0.0, 4.99e-3)),))
+    assert_one_line(liggghts_driver.run_deck(tmp_path, f"{liggghts_driver.deck(case)}{change}\nrun 10\n"), *words)
 
 
 def test_numbers_by_which_contacts_know_each_other_stay(tmp_path):
