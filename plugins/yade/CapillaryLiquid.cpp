@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <core/InteractionLoop.hpp>
 #include <core/Omega.hpp>
@@ -171,6 +172,7 @@ void CapillaryLiquid::action() {
 	number(exchange.requests);
 	number(exchange.broken);
 	ledger.give_back(exchange.broken, grains());
+	if (const long lost = FinnieRabinowiczPhys::bridgesLost; std::exchange(bridgesLost, lost) != lost) vanished = true;
 	if (vanished) reconcile();
 	ledger.form(exchange.requests, grains(), [](const LiquidExchange::Request& r, const capillary::NewBridge<double>& bridge) {
 		r.phys->setBridge(bridge.volume, bridge.imbalance, r.radius, r.other_radius);

@@ -125,6 +125,18 @@ def erased():
     return [before, tallies(engine, 3)]
 
 
+def cleared():
+    """A script ends all interactions; the grains still touch."""
+    engine = scene_with([held((0, 0, 0)), held((TOUCH, 0, 0)), held((-TOUCH, 0, 0))])
+    for k in range(3):
+        engine.setVolume(k, 1e-10)
+    O.step()
+    before = tallies(engine, 3)
+    O.interactions.clear()
+    O.run(2, True)
+    return [before, tallies(engine, 3)]
+
+
 def reused_id():
     """A grain is erased, with the bridge that holds it, and another one is put in its place before the next step."""
     engine = scene_with([held((0, 0, 0)), held((TOUCH, 0, 0)), held((-TOUCH, 0, 0))], content=0.01)
