@@ -119,6 +119,8 @@ def test_a_log_that_is_driven_pushes_as_a_wall(run, tmp_path, space):
 @pytest.mark.parametrize(("change", "words"), [
     ({"motion": "nve"}, ("fix motion (nve) moves logs", "fix nve/sphere moves those that follow their forces")),
     ({"boundary": "p f f", "extra": ["fix squeeze all deform 1 x erate -0.1"]}, ("constant size and shape", "fix squeeze (deform)")),
+    ({"run": "run 1\ngroup gone id 2\ndelete_atoms group gone compress no\ncreate_atoms 1 single 0.5 0 0 units box\nrun 1"},
+     ("atom 2 has the number of one that was deleted", "write 'run 0'")),
     ({"run": "run 1\ngroup gone id 1\ndelete_atoms group gone"}, ("delete_atoms", "other numbers", "add 'compress no'")),
 ])
 def test_what_would_be_wrong_without_a_word_is_refused(engine, tmp_path, change, words):

@@ -99,6 +99,20 @@ def test_numbers_by_which_contacts_know_each_other_stay(tmp_path, deck, command,
         assert done.code == 0, done.error
 
 
+def test_a_new_grain_does_not_take_over_the_bridge_of_a_deleted_one(tmp_path):
+    """It gets the number of that one, and is as near to its neighbour, but has not touched it."""
+    case = Scenario(name="", material=WET, steps=10, grains=(Grain(position=(0.0, 0.0, 4.9e-3)), Grain(position=(0.0, 0.0, -5e-3))))
+    new = "create_atoms 1 single 0 0 -0.0052 units box\nset atom 2 diameter 0.01 density 2500\n"
+    gone = "group gone id 2\ndelete_atoms group gone compress no\n"
+    deck = lammps_driver.deck(case)
+    done = lammps_driver.run_deck(tmp_path, f"{deck}{gone}{new}run 10\n")
+    assert_one_line(done, "atom 2 has the number of one that was deleted", "run 0")
+    force = "thermo_style custom step fmax\nthermo_modify format float %.17g\n"
+    for ranks in (1, 2):
+        done = lammps_driver.run_deck(tmp_path, f"{deck}{gone}run 0\n{new}{force}run 0\n", ranks=ranks)
+        assert done.code == 0 and done.output.rpartition("Fmax")[2].split()[:2] == ["10", "0"], done.error or done.output[-2000:]
+
+
 def test_a_wall_needs_the_pair_style(tmp_path, deck):
     lines = [line for line in deck.splitlines() if not line.startswith(("pair_style", "pair_coeff"))]
     assert_one_line(lammps_driver.run_deck(tmp_path, "\n".join(lines) + "\n"), "fix floor wall/dembark", "pair_style dembark/granular")

@@ -184,3 +184,14 @@ def test_another_pair_style_after_a_run_is_warned_of(tmp_path):
     assert done.code == 0 and done.output.count("WARNING: pair_style gran: given again after a run") == 1, done.output[-2000:]
     assert "given again" not in run(tmp_path / "once").output
     assert "given again" not in run(tmp_path / "clear", lambda deck: f"{deck}clear\n{deck}").output
+
+
+def test_a_new_grain_does_not_take_over_the_bridge_of_a_deleted_one(tmp_path):
+    """It gets the number of that one, and is as near to its neighbour, but has not touched it."""
+    new = "create_atoms 1 single 0 0 -0.0052 units box\nset atom 2 diameter 0.01 density 2500\n"
+    gone = "group gone id 2\ndelete_atoms group gone compress no\n"
+    assert_one_line(run(tmp_path, lambda deck: f"{deck}{gone}{new}run 10\n"), "atom 2 has the number of one that was deleted", "run 0")
+    force = "variable size equal fz[2]\nfix out all print 1 \"found ${size}\" file out.txt\n"
+    done = run(tmp_path, lambda deck: f"{deck}{gone}run 0\n{new}{force}run 1\n")
+    assert done.code == 0, done.error or done.output[-2000:]
+    assert (tmp_path / "out.txt").read_text().splitlines()[-1] == "found 0"
