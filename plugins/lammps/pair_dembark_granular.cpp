@@ -7,6 +7,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "domain.h"
 #include "error.h"
 #include "force.h"
 #include "memory.h"
@@ -16,6 +17,7 @@
 #include "update.h"
 
 #include "contact_call.h"
+#include "double_contacts.h"
 #include "engine_access.h"
 #include "fix_capillary_liquid.h"
 
@@ -168,6 +170,13 @@ void PairDembarkGranular::check_radii() {
     }
 }
 
+/// When the pairs are listed.
+void PairDembarkGranular::refuse_double_contacts() const {
+  const std::string wrong = dembark_family::double_contact_error(*list, history_->firstflag, *atom, *domain, force->newton_pair != 0,
+                                                                 2.0 * largest_radius() + reach());
+  if (!wrong.empty()) error->one(FLERR, "pair_style dembark/granular: " + wrong);
+}
+
 /// Where grains grow: lists are made anew before two of them can meet that are in none. LAMMPS looks at displacements only.
 void PairDembarkGranular::watch_growth() {
   if (neighbor->ago == 0) {
@@ -276,6 +285,7 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
                history_->nlocal_neigh, atom->nlocal, other_release);
   if (neighbor->ago == 0) {
     check_radii();
+    refuse_double_contacts();
     if (!rigid_.empty()) take_body_masses();
   }
   if (grains_grow_) watch_growth();

@@ -211,6 +211,7 @@ class CohesionOnCore : public CohesionModelBase {
   inline void endSurfacesIntersect(SurfacesIntersectData&, ForceData&, ForceData&) {}
   void beginPass(SurfacesIntersectData& d, ForceData&, ForceData&) {
     if (!pair_ || !d.computeflag || !d.shearupdate || (carried_ && !owner_->collecting())) return;
+    dembark_liggghts::refuse_double_contacts(*pair_, *atom, *neighbor, *domain, error);
     dembark_liggghts::end_parted_pairs(*pair_, *atom, neighbor->contactDistanceFactor, CONTACT_COHESION_MODEL,
                                        [this](int i, int j, double* history) {
                                          if (carried_ && history[offset_] > 0.0) return_liquid(i, j, history);

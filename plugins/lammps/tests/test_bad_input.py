@@ -99,6 +99,18 @@ def test_numbers_by_which_contacts_know_each_other_stay(tmp_path, deck, command,
         assert done.code == 0, done.error
 
 
+@pytest.mark.parametrize("newton", ["off", "on"])
+def test_a_pair_that_touches_twice_is_refused(tmp_path, newton):
+    """Across a box of 1.2 diameters; side by side in it a pair touches once."""
+    case = Scenario(name="", material=Material(presliding="partial_slip"), steps=10,
+                    grains=(Grain(position=(0.0, 0.0, 0.003)), Grain(position=(0.0078, 0.0, 0.009))))
+    deck = lammps_driver.deck(case, newton=newton).replace("boundary f f f", "boundary f f p").replace(
+        "block -0.05 0.05 -0.05 0.05 -0.05 0.05", "block -0.05 0.05 -0.05 0.05 0 0.012")
+    assert_one_line(lammps_driver.run_deck(tmp_path, deck + "run 1\n"), "grain 1 touches grain 2 and an image of it", "two diameters")
+    done = lammps_driver.run_deck(tmp_path, deck.replace("0.0078 0.0 0.009", "0.0098 0.0 0.003") + "run 1\n")
+    assert done.code == 0, done.error
+
+
 def test_a_new_grain_does_not_take_over_the_bridge_of_a_deleted_one(tmp_path):
     """It gets the number of that one, and is as near to its neighbour, but has not touched it."""
     case = Scenario(name="", material=WET, steps=10, grains=(Grain(position=(0.0, 0.0, 4.9e-3)), Grain(position=(0.0, 0.0, -5e-3))))

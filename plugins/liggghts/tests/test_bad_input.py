@@ -195,3 +195,17 @@ def test_a_new_grain_does_not_take_over_the_bridge_of_a_deleted_one(tmp_path):
     done = run(tmp_path, lambda deck: f"{deck}{gone}run 0\n{new}{force}run 1\n")
     assert done.code == 0, done.error or done.output[-2000:]
     assert (tmp_path / "out.txt").read_text().splitlines()[-1] == "found 0"
+
+
+@pytest.mark.parametrize("lanes", ["8", "1"])
+def test_a_pair_that_touches_twice_is_refused(tmp_path, monkeypatch, lanes):
+    """Across a box of 1.2 diameters; side by side in it a pair touches once."""
+    monkeypatch.setenv("DEMBARK_LANES", lanes)
+    case = Scenario(name="", material=Material(presliding="partial_slip"), steps=10,
+                    grains=(Grain(position=(0.0, 0.0, 0.003)), Grain(position=(0.0078, 0.0, 0.009))))
+    deck = liggghts_driver.deck(case).replace("boundary f f f", "boundary f f p").replace(
+        "block -0.05 0.05 -0.05 0.05 -0.05 0.05", "block -0.05 0.05 -0.05 0.05 0 0.012").replace(
+        "neigh_modify delay 0", "neigh_modify delay 0 every 1 check no")
+    assert_one_line(liggghts_driver.run_deck(tmp_path, deck), "grain 1 touches grain 2 and an image of it", "two diameters")
+    done = liggghts_driver.run_deck(tmp_path, deck.replace("0.0078 0.0 0.009", "0.0098 0.0 0.003"))
+    assert done.code == 0, done.error
