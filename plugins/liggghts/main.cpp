@@ -106,7 +106,9 @@ void enter_styles(LAMMPS_NS::LAMMPS& host) {
   if (run != &run_and_keep_histories) stock_run = std::exchange(run, &run_and_keep_histories);
   auto& delete_atoms = commands["delete_atoms"];
   if (delete_atoms != &delete_and_keep_numbers) stock_delete_atoms = std::exchange(delete_atoms, &delete_and_keep_numbers);
-  commands["resume_state"] = [](LAMMPS_NS::LAMMPS* owner, int narg, char** arg) { LAMMPS_NS::ResumeState(owner).command(narg, arg); };
+  dembark_liggghts::commands(*host.input)["resume_state"] = [](LAMMPS_NS::LAMMPS* owner, int narg, char** arg) {
+    LAMMPS_NS::ResumeState(owner).command(narg, arg);
+  };
   entered = true;
 }
 
