@@ -39,6 +39,7 @@ class EngineFix : public LAMMPS_NS::Fix {
   }
   bool has_spheres() const { return atom->radius_flag && atom->rmass_flag && atom->omega_flag; }
   static bool moves_clusters(const Fix& fix) { return fix.rigid_flag; }
+  static bool changes_box(const Fix& fix) { return (fix.box_change & ~BOX_CHANGE_DOMAIN) != 0; }
   /// Acceleration (m/s^2) of a fix gravity, as it is when it is asked.
   std::function<dembark::Vec3<double>()> acceleration_of(Fix* fix) const {
     int dimension = 0;

@@ -174,7 +174,7 @@ void FixWallDembark::act_on(int i, bool advance) {
     const dembark::ContactForce out = contact_step(p, b, update->dt, state, advance);
     if (dembark::has_no_direction(out.normal)) refuse_coincidence(i);
     const bool touching = out.overlap > 0.0;
-    if (advance && !was_held && (state.cohesion.held() || (liquid_ && touching)))
+    if (advance && (state.cohesion.held() || (liquid_ && touching)))
       dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
     if (!out.interacting && !(volume > 0.0)) continue;
     if (tally_ && out.interacting)

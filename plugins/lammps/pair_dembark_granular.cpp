@@ -7,6 +7,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "domain.h"
 #include "error.h"
 #include "force.h"
 #include "memory.h"
@@ -16,6 +17,7 @@
 #include "update.h"
 
 #include "contact_call.h"
+#include "double_contacts.h"
 #include "engine_access.h"
 #include "fix_capillary_liquid.h"
 
@@ -168,6 +170,13 @@ void PairDembarkGranular::check_radii() {
     }
 }
 
+/// When the pairs are listed.
+void PairDembarkGranular::refuse_double_contacts() const {
+  const std::string wrong = dembark_family::double_contact_error(*list, history_->firstflag, *atom, *domain, force->newton_pair != 0,
+                                                                 2.0 * largest_radius() + reach());
+  if (!wrong.empty()) error->one(FLERR, "pair_style dembark/granular: " + wrong);
+}
+
 /// Where grains grow: lists are made anew before two of them can meet that are in none. LAMMPS looks at displacements only.
 void PairDembarkGranular::watch_growth() {
   if (neighbor->ago == 0) {
@@ -276,6 +285,7 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
                history_->nlocal_neigh, atom->nlocal, other_release);
   if (neighbor->ago == 0) {
     check_radii();
+    refuse_double_contacts();
     if (!rigid_.empty()) take_body_masses();
   }
   if (grains_grow_) watch_growth();
@@ -305,16 +315,15 @@ void PairDembarkGranular::compute(int eflag, int vflag) {
     const double before = state.cohesion.bridge_volume;
     const ContactForce out = contact_step(p, b, update->dt, state, advance);
     if (dembark::has_no_direction(out.normal)) refuse_coincidence(i, j);
+    // The set-up looks at all of them: the skin may be a new one.
+    if (state.cohesion.held() && !(advance && was_held)) check_reach(i, j, state.cohesion.rupture_distance);
     if (advance) {
-      if (state.cohesion.held() && !was_held) {
-        dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
-        check_reach(i, j, state.cohesion.rupture_distance);
-      }
+      // In every step: a run may go on with a longer one.
+      if (state.cohesion.held() || (liquid_ && out.overlap > 0.0)) dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
       touches = out.interacting;
       layout_.store(row, state);
       if (liquid_) {
         if (!touched) row[layout_.imbalance_at()] = 0.0;
-        if (out.overlap > 0.0 && !was_held) dembark_lammps::check_time_step(error, p.cohesion.liquid, b, update->dt);
         liquid_->report({i, j, false}, atom->radius[i], atom->radius[j], p.cohesion.liquid, out.overlap > 0.0, before,
                         row + layout_.cohesion_at(), row + layout_.imbalance_at());
       }

@@ -53,6 +53,7 @@ class PairDembarkGranular : public Pair, dembark_family::PackedContacts {
   /// The end of the fix's name, its group, its style, and how many numbers it keeps of a contact.
   virtual std::string history_fix() const;
   void check_radii();
+  void refuse_double_contacts() const;
   void refuse_coincidence(int i, int j) const override;
   void check_reach(int i, int j, double rupture_distance) const override;
 

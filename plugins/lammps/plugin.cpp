@@ -8,6 +8,7 @@
 #include "error.h"
 #include "lammps.h"
 
+#include "atom_numbers.h"
 #include "fix_arguments.h"
 #include "fix_capillary_liquid.h"
 #include "fix_energy_account.h"
@@ -97,4 +98,5 @@ void lammpsplugin_init(void* host, void* handle, void* register_style) {
   style.creator.fix = &create_fix<LAMMPS_NS::FixLcpImpact>;
   add("fix", "lcp/impact", "impacts of logs by a linear complementarity problem a step");
   dembark_lammps::watch_fixes(lammps);
+  dembark_lammps::keep_numbers(lammps);
 }

@@ -37,6 +37,7 @@ void EnergyAccountFix::init() {
   only_verlet();
   if (force->newton_pair) fail("newton must be off: each rank tallies for the grains that it owns");
   only_coherent_units();
+  only_constant_box("it accounts for works in");
   only_spheres("it accounts for");
   check_contacts();
   check_motion();

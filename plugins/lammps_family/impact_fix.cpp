@@ -1,6 +1,7 @@
 #include "impact_fix.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <string>
 
@@ -49,10 +50,12 @@ void ImpactFix::init() {
   only_verlet();
   only_coherent_units();
   if (domain->triclinic) fail("a triclinic box is not supported; use an orthogonal one");
+  only_constant_box("it knows logs in");
   only_single_grains("it knows");
   if (impacts_->command.has_lengths() && domain->dimension == 2)
     fail("logs with a length move in space; use dimension 3, or without length and logs the model of the cross-section");
   check_order();
+  find_movers();
   torque_scale_ = find_torque_scale();
   find_walls();
   reset_dt();
@@ -76,6 +79,18 @@ void ImpactFix::check_order() const {
     if (std::none_of(std::begin(observers), std::end(observers), observes))
       fail(std::string("fix ") + fix->id + " (" + fix->style +
            ") may add forces after the contact forces are known; define it before this fix");
+  }
+}
+
+/// Which logs follow their forces: the others are held, or driven by fix move. Collective.
+void ImpactFix::find_movers() {
+  moved_ = frozen_ = 0;
+  for (const Fix* const fix : fixes()) {
+    if (is(*fix, "freeze")) frozen_ |= fix->groupbit;
+    if (begins_with(fix->style, "nve/sphere")) moved_ |= fix->groupbit;
+    else if (fix->time_integrate && !is(*fix, "move") && !is(*fix, "nve/noforce") && meets(*fix))
+      fail(std::string("fix ") + fix->id + " (" + fix->style +
+           ") moves logs; fix nve/sphere moves those that follow their forces, fix move those that are driven");
   }
 }
 
@@ -110,9 +125,11 @@ void ImpactFix::gather_atoms() {
   for (int i = 0; i < atom->nlocal; ++i) {
     if (!(atom->mask[i] & groupbit)) continue;
     own_atom_.push_back(i);
-    const double mass = atom->rmass[i], radius = atom->radius[i];
-    own_body_.push_back({atom->tag[i], mass, impacts_->command.inertia(mass, radius), radius, atom->type[i] - 1, vector(atom->x[i]),
-                         vector(atom->v[i]), vector(atom->omega[i]), vector(atom->f[i]), torque_scale_ * vector(atom->torque[i])});
+    const bool held = !(atom->mask[i] & moved_) || (atom->mask[i] & frozen_);
+    const double mass = held ? INFINITY : atom->rmass[i], radius = atom->radius[i];
+    own_body_.push_back({atom->tag[i], mass, held ? INFINITY : impacts_->command.inertia(mass, radius), radius, atom->type[i] - 1,
+                         vector(atom->x[i]), vector(atom->v[i]), vector(atom->omega[i]), vector(atom->f[i]),
+                         torque_scale_ * vector(atom->torque[i])});
   }
   ranks_.gather(own_body_, all_body_);
 }
@@ -143,8 +160,11 @@ void ImpactFix::update_atoms() {
   for (std::size_t k = 0; k < own_atom_.size(); ++k) {
     const int i = own_atom_[k];
     const BodyUpdate& update = own_update_[k];
-    add(atom->f[i], update.force);
-    add(atom->torque[i], update.torque, 1.0 / torque_scale_);
+    // Fix freeze, which came before this one, has taken all forces away.
+    if (!(atom->mask[i] & frozen_)) {
+      add(atom->f[i], update.force);
+      add(atom->torque[i], update.torque, 1.0 / torque_scale_);
+    }
     if (!peratom_flag) continue;
     std::fill_n(atom->omega[i], 3, 0.0);
     add(atom->omega[i], update.spin);

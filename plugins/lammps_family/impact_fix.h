@@ -46,6 +46,7 @@ class ImpactFix : public SharedFix {
 
   void on_first(const std::function<void()>& work);
   void check_order() const;
+  void find_movers();
   double find_torque_scale() const;
   dembark::impact::PeriodicBox box() const;
   void gather_atoms();
@@ -58,7 +59,8 @@ class ImpactFix : public SharedFix {
   std::vector<int> own_atom_;  // of each own body, in the order in which they are gathered
   std::vector<dembark::impact::Body> own_body_, all_body_;
   std::vector<dembark::impact::BodyUpdate> own_update_, all_update_;
-  double torque_scale_ = 1.0;  // the engine turns atoms with an inertia of its own
+  int moved_ = 0, frozen_ = 0;  // bits of the groups of fixes nve/sphere, and freeze
+  double torque_scale_ = 1.0;   // the engine turns atoms with an inertia of its own
   int local_capacity_ = 1, atom_capacity_ = 0;
 };
 

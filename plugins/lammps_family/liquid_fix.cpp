@@ -106,8 +106,10 @@ void LiquidFix::after_new_list() {
   double excess = 0.0;
   const int full = ledger_.reconcile_pairs(grains(), [this](const auto& visit) { each_pair_bridge(visit); }, excess);
   if (full >= 0)
-    fail_alone("the bridges of " + grain(full) + " hold " + amount(excess) +
-               " more than it gave to them: it may touch a grain and an image of it; is the box smaller than two cut-offs?");
+    fail_alone(
+        "the bridges of " + grain(full) + " hold " + amount(excess) +
+        " more than it gave to them: they are older than this fix, or it touches a grain and an image of it in a box smaller than two "
+        "cut-offs");
   const double missing = ledger_.audit(grains(), !update->setupflag && update->ntimestep > update->firststep);
   if (missing != 0.0)
     fail("there is " + amount(ledger_.expected) + " of liquid, and " + amount(ledger_.expected + missing) +

@@ -39,6 +39,7 @@ void MonitorFix::init() {
   only_verlet();
   only_coherent_units();
   only_spheres("it judges");
+  if (run_.impacts > 0) only_constant_box("it integrates impacts again in");
   find_movers("it judges");
   want_movers();
   find_contacts();

@@ -37,6 +37,15 @@ std::string run_style_error(const Update& update) {
   return "run_style " + style + " is not supported; use run_style verlet";
 }
 
+std::string new_numbers_error(const Atom& atom, const Update& update, int narg, char** arg) {
+  if (atom.molecular || (!update.first_update && update.ntimestep == 0)) return "";
+  std::string compress = "yes";
+  for (int k = 2; k + 1 < narg; ++k)
+    if (std::strcmp(arg[k], "compress") == 0) compress = arg[k + 1];
+  if (compress == "no" || compress == "off" || compress == "false") return "";
+  return "delete_atoms would give the atoms that stay other numbers, by which contacts and logs know each other; add 'compress no'";
+}
+
 SavedPart::SavedPart(const char* buffer) : at_(buffer + head) {
   std::uint64_t size = 0;
   if (std::memcmp(buffer, format, sizeof format - 1) != 0) refuse();
@@ -100,6 +109,11 @@ void SharedFix::only_coherent_units() const {
   if (const std::string wrong = units_error(*force, *update); !wrong.empty()) fail(wrong);
 }
 
+void SharedFix::only_constant_box(const std::string& does) const {
+  for (const Fix* const fix : fixes())
+    if (changes_box(*fix)) fail(does + " a box of constant size and shape, and fix " + fix->id + " (" + fix->style + ") changes it");
+}
+
 void SharedFix::only_spheres(const std::string& does) const {
   if (!has_spheres()) fail(does + " spheres only; use " + sphere_style);
 }
@@ -146,9 +160,9 @@ void GrainFix::find_movers(const std::string& does) {
   gravities_.clear();
   only_single_grains(does);
   for (Fix* const fix : fixes()) {
-    if (is(*fix, "gravity")) gravities_.push_back({fix->groupbit, acceleration_of(fix)});
+    if (begins_with(fix->style, "gravity")) gravities_.push_back({fix->groupbit, acceleration_of(fix)});
     if (is(*fix, "freeze")) frozen_ |= fix->groupbit;
-    if (is(*fix, "nve/sphere")) movers_.emplace_back(fix->groupbit, inertia_of(*fix));
+    if (begins_with(fix->style, "nve/sphere")) movers_.emplace_back(fix->groupbit, inertia_of(*fix));
     if (is(*fix, "nve")) movers_.emplace_back(fix->groupbit, 0.0);
   }
   for (const auto& mover : movers_) moving_ |= mover.first;

@@ -47,6 +47,10 @@ std::string units_error(const LAMMPS_NS::Force& force, const LAMMPS_NS::Update& 
 /// What is wrong with run styles whose steps have more than one length, or nothing.
 std::string run_style_error(const LAMMPS_NS::Update& update);
 
+/// What is wrong with `delete_atoms` and these words of it, or nothing. Unless they say 'compress no', the atoms that stay get other
+/// numbers, and a run or a restart file has left histories whose partners are known by theirs.
+std::string new_numbers_error(const LAMMPS_NS::Atom& atom, const LAMMPS_NS::Update& update, int narg, char** arg);
+
 /// A fix's part of a restart file, piece by piece, as SharedFix::write_part() wrote it. The engine hands back its bytes without their
 /// number: they begin with a word for their format and with their size. Another format or size is thrown as std::runtime_error.
 class SavedPart {
@@ -104,6 +108,9 @@ class SharedFix : public dembark_engine::EngineFix {
   void only_one() const;
   void only_verlet() const;
   void only_coherent_units() const;
+  /// Ends the run where a fix changes the box: what it does to contacts across a border is not known here. `does`: what this fix does in
+  /// the box, for messages.
+  void only_constant_box(const std::string& does) const;
   /// `does`: what this fix does with them, for messages.
   void only_spheres(const std::string& does) const;
   /// Ends the run where a fix moves bodies made of several grains. `does`: what this fix does with single grains, for messages.

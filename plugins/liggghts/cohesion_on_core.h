@@ -99,9 +99,11 @@ class CohesionOnCore : public CohesionModelBase {
     const double modulus = youngs_modulus_ ? youngs_modulus_[d.itype][d.jtype] : 0.0;
     out.cohesive_force = cohesion_step(law, {bodies.radius_1, bodies.radius_2, -overlap, touching, modulus}, state);
     const bool is_there = state.held();
-    if (is_there && !was_there)
+    // Also in the set-up, which leaves histories as they are: the skin may be a new one.
+    if (is_there && !(was_there && d.shearupdate))
       dembark_liggghts::check_reach(neighbor, error, state.rupture_distance, d.is_wall ? d.radi : d.radsum, d.is_wall && !d.mesh);
-    if (touching && !was_there && (is_there || carried_)) check_time_step(liquid, bodies.effective_radius(), effective_mass);
+    // In every step: a run may go on with a longer one.
+    if (touching && (is_there || carried_)) check_time_step(liquid, bodies.effective_radius(), effective_mass);
     if (update_history) {
       const double before = history[0];
       dembark::store_cohesion(history, state);
@@ -209,6 +211,7 @@ class CohesionOnCore : public CohesionModelBase {
   inline void endSurfacesIntersect(SurfacesIntersectData&, ForceData&, ForceData&) {}
   void beginPass(SurfacesIntersectData& d, ForceData&, ForceData&) {
     if (!pair_ || !d.computeflag || !d.shearupdate || (carried_ && !owner_->collecting())) return;
+    dembark_liggghts::refuse_double_contacts(*pair_, *atom, *neighbor, *domain, error);
     dembark_liggghts::end_parted_pairs(*pair_, *atom, neighbor->contactDistanceFactor, CONTACT_COHESION_MODEL,
                                        [this](int i, int j, double* history) {
                                          if (carried_ && history[offset_] > 0.0) return_liquid(i, j, history);

@@ -11,11 +11,13 @@
 #include "error.h"
 #include "fix_mesh_surface.h"
 #include "neigh_list.h"
+#include "neighbor.h"
 #include "pair_gran.h"
 #include "tri_mesh.h"
 
 #include "dembark/contact.hpp"
 #include "dembark/contact_history.hpp"
+#include "double_contacts.h"
 #include "shared_fix.h"
 
 namespace dembark_liggghts {
@@ -113,6 +115,16 @@ void end_parted_pairs(LAMMPS_NS::PairGran& pair, const LAMMPS_NS::Atom& atom, do
       flag[k] &= ~flags;
     }
   }
+}
+
+/// When the pairs are listed.
+inline void refuse_double_contacts(LAMMPS_NS::PairGran& pair, const LAMMPS_NS::Atom& atom, const LAMMPS_NS::Neighbor& neighbor,
+                                   const LAMMPS_NS::Domain& domain, LAMMPS_NS::Error* error) {
+  const LAMMPS_NS::NeighList* const list = pair.list;
+  if (neighbor.ago != 0 || !list || !list->listgranhistory) return;
+  const std::string wrong =
+      dembark_family::double_contact_error(*list, list->listgranhistory->firstneigh, atom, domain, false, neighbor.cutneighmax);
+  if (!wrong.empty()) error->one(FLERR, ("pair_style gran: " + wrong).c_str());
 }
 
 /// The run ends when two centres lie on each other: there is no normal, and the engine's own models would give no number. `j` < 0: a wall.

@@ -191,6 +191,7 @@ class DirectPairLoop : public LIGGGHTS::PairStyles::Granular<LIGGGHTS::ContactMo
     else pair->evflag = pair->vflag_fdotr = 0;
     if (pair->list->inum == 0) return;
     LAMMPS_NS::Atom& atom = *lmp_->atom;
+    refuse_double_contacts(*pair, atom, *lmp_->neighbor, *lmp_->domain, lmp_->error);
     const bool keeps = pair->shearupdate();
     // The factor of relaxed contacts (PairGran::relax) is 1 in this version of the engine.
     namespace models = LIGGGHTS::ContactModels;

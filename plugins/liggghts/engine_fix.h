@@ -47,6 +47,7 @@ class EngineFix : public LAMMPS_NS::Fix {
   static bool moves_clusters(const Fix& fix) {
     return std::strncmp(fix.style, "rigid", 5) == 0 || std::strncmp(fix.style, "multisphere", 11) == 0;
   }
+  static bool changes_box(const Fix& fix) { return fix.box_change_size || fix.box_change_shape; }
   /// Acceleration (m/s^2) of a fix gravity, as it is when it is asked.
   std::function<dembark::Vec3<double>()> acceleration_of(Fix* fix) const {
     auto* const gravity = static_cast<LAMMPS_NS::FixGravity*>(fix);

@@ -18,6 +18,7 @@
 #include "error.h"
 #include "force.h"
 #include "lammps.h"
+#include "update.h"
 #include "contact_models.h"
 #include "style_surface_model.h"
 #include "style_normal_model.h"
@@ -173,9 +174,20 @@ void check_restarted_histories(LAMMPS* lammps, std::int64_t hash) {
   lammps->error->all(FLERR, line.c_str());
 }
 
+/// The engine begins the histories of pairs anew with each command pair_style, also when it has the same models.
+void warn_of_lost_histories(const LAMMPS& lammps, std::int64_t hash) {
+  const auto before = pair_hashes.find(&lammps);
+  if (!lammps.update->first_update || before == pair_hashes.end() || lammps.comm->me != 0) return;
+  if (is_ours(combination(before->second)) || is_ours(combination(hash)))
+    lammps.error->warning(FLERR,
+                          "pair_style gran: given again after a run, it takes friction springs, slip and bridges from all pairs of grains, "
+                          "which begin as if they had just met; give it once, before the first run");
+}
+
 /// Makes the loop of any combination, ours or not; read_restart makes that of its file, and pair_style the one to go on with.
 PairHost* make_pair_loop(LAMMPS* lammps, LAMMPS_NS::PairGran* parent, std::int64_t hash) {
   check_restarted_histories(lammps, hash);
+  warn_of_lost_histories(*lammps, hash);
   pair_hashes[lammps] = hash;
   const auto maker = pair_makers.find(int(hash));
   return (maker == pair_makers.end() ? &fallback_or_refuse<PairHost> : maker->second)(lammps, parent, hash);

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <string>
 #include <utility>
 
 #include "fix_contact_history.h"
@@ -18,6 +19,7 @@
 #include "modify.h"
 #include "signal_handling.h"
 
+#include "deleted_atoms.h"
 #include "engine_access.h"
 #include "fix_adapt_at_once.h"
 #include "fix_capillary_liquid.h"
@@ -31,11 +33,13 @@
 #include "fix_wall_motion.h"
 #include "granular_combinations.h"
 #include "pair_sph_coupled.h"
+#include "shared_fix.h"
 
 namespace {
 
 bool entered = false;  // the styles are in the library's tables
-dembark_liggghts::CommandCreator stock_run = nullptr;
+dembark_liggghts::CommandCreator stock_run = nullptr, stock_delete_atoms = nullptr;
+dembark_family::DeletedAtoms deleted_atoms;
 
 template <class Style>
 LAMMPS_NS::Fix* create_fix(LAMMPS_NS::LAMMPS* lammps, int narg, char** arg) {
@@ -58,16 +62,29 @@ void start_alone() {
 /// out. Atoms that a script creates in between overwrite the ghosts, and contacts across borders would lose their histories. Runs of stock
 /// models stay as they are in stock LIGGGHTS.
 void run_and_keep_histories(LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
+  const std::string wrong = deleted_atoms.run_error(*host->atom, host->world);
+  if (!wrong.empty()) host->error->all(FLERR, wrong.c_str());
   stock_run(host, narg, arg);
+  deleted_atoms.clear();
   if (!dembark_liggghts::has_our_models(*host->force)) return;
   for (int i = 0; i < host->modify->nfix; ++i)
     if (!std::strcmp(host->modify->fix[i]->style, "contacthistory")) host->modify->fix[i]->setup_pre_exchange();
+}
+
+/// Histories of pairs, and logs, are found again by the numbers of the atoms.
+void delete_and_keep_numbers(LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
+  const bool by_number = dembark_liggghts::has_our_models(*host->force) || host->modify->find_fix_style("lcp/impact", 0);
+  const std::string wrong = by_number ? dembark_family::new_numbers_error(*host->atom, *host->update, narg, arg) : "";
+  if (!wrong.empty()) host->error->all(FLERR, wrong.c_str());
+  if (by_number && host->update->first_update) deleted_atoms.watch(*host->atom, host->world, [&] { stock_delete_atoms(host, narg, arg); });
+  else stock_delete_atoms(host, narg, arg);
 }
 
 /// The library enters its own combinations when it is made; ours come after, where its fallback can be replaced.
 void enter_styles(LAMMPS_NS::LAMMPS& host) {
   if (!host.modify || !host.force || !host.input) return;
   LAMMPS_NS::ResumeState::file.forget(&host);
+  deleted_atoms.clear();
   dembark_liggghts::register_contact_models();
   auto& fixes = dembark_liggghts::fix_styles(*host.modify);
   // In place of the stock style, of the same name.
@@ -87,6 +104,8 @@ void enter_styles(LAMMPS_NS::LAMMPS& host) {
   auto& commands = dembark_liggghts::commands(*host.input);
   auto& run = commands["run"];
   if (run != &run_and_keep_histories) stock_run = std::exchange(run, &run_and_keep_histories);
+  auto& delete_atoms = commands["delete_atoms"];
+  if (delete_atoms != &delete_and_keep_numbers) stock_delete_atoms = std::exchange(delete_atoms, &delete_and_keep_numbers);
   dembark_liggghts::commands(*host.input)["resume_state"] = [](LAMMPS_NS::LAMMPS* owner, int narg, char** arg) {
     LAMMPS_NS::ResumeState(owner).command(narg, arg);
   };

@@ -140,6 +140,7 @@ class TangentialModel<TANGENTIAL_FINNIE_RABINOWICZ> : public TangentialModelBase
 
   inline void beginPass(SurfacesIntersectData& d, ForceData&, ForceData&) {
     if (!pair_ || !d.computeflag || !d.shearupdate) return;
+    dembark_liggghts::refuse_double_contacts(*pair_, *atom, *neighbor, *domain, error);
     dembark_liggghts::end_parted_pairs(*pair_, *atom, neighbor->contactDistanceFactor, CONTACT_TANGENTIAL_MODEL,
                                        [this](int, int, double* history) { store(history, {}); });
   }

@@ -87,6 +87,58 @@ def test_forces_of_a_second_run_are_those_of_the_present_masses_and_forces(run, 
     assert run(tmp_path, case).vector("peak") == pytest.approx((overlap + response * gravity) / (2.0 / s + response / mass), rel=1e-9)
 
 
+IN_SPACE = " length 0.5 axis 0 0 1"
+
+
+@pytest.mark.parametrize("space", ["", IN_SPACE])
+@pytest.mark.parametrize("hold", ["", "fix hold one freeze"])
+def test_a_log_that_follows_no_forces_is_held(run, tmp_path, hold, space):
+    """A log bounces off another one of infinite mass: v sqrt(m k) with k = s/2, in space in two halves; nothing is lost."""
+    sides = 2 if space else 1
+    motion = "nve/sphere" if hold else "nve/sphere\nunfix motion\nfix motion two nve/sphere"
+    case = Case([Log((0.0, 0.0)), Log((0.0, 0.2002), (0.0, -1.0))], f"stiffness 1e7 theta 0.5{space}", 1e-5, "run 1500",
+                before=f"group one id 1\ngroup two id 2\n{hold}", motion=motion, every=1500)
+    found = run(tmp_path, case)
+    assert found.last[0, 1:7] == pytest.approx(0.0, abs=1e-12)
+    assert found.velocity()[1] == pytest.approx([0.0, 1.0, 0.0], abs=2e-3)
+    assert found.vector("peak_so_far") == pytest.approx(math.sqrt(50.0 * 0.5e7) / sides, rel=1e-3)
+    assert abs(found.vector("dissipated")) < 0.05 and found.vector("impacts") == sides
+
+
+@pytest.mark.parametrize("space", ["", IN_SPACE])
+def test_a_log_that_is_driven_pushes_as_a_wall(run, tmp_path, space):
+    """An elastic impact: the free log leaves with twice the speed of the driven one."""
+    case = Case([Log((0.0, 0.0)), Log((0.2002, 0.0))], f"stiffness 1e7 theta 0.5{space}", 1e-5, "run 2000", every=2000,
+                before="group one id 1\ngroup two id 2\nfix drive one move linear 0.5 0 0 units box",
+                motion="nve/sphere\nunfix motion\nfix motion two nve/sphere")
+    found = run(tmp_path, case)
+    assert found.velocity()[:, 0] == pytest.approx([0.5, 1.0], abs=2e-3)
+    assert found.last[0, 1] == pytest.approx(0.01, rel=1e-9)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ({"motion": "nve"}, ("fix motion (nve) moves logs", "fix nve/sphere moves those that follow their forces")),
+    ({"boundary": "p f f", "extra": ["fix squeeze all deform 1 x erate -0.1"]}, ("constant size and shape", "fix squeeze (deform)")),
+    ({"run": "run 1\ngroup gone id 2\ndelete_atoms group gone compress no\ncreate_atoms 1 single 0.5 0 0 units box\nrun 1"},
+     ("atom 2 has the number of one that was deleted", "write 'run 0'")),
+    ({"run": "run 1\ngroup gone id 1\ndelete_atoms group gone"}, ("delete_atoms", "other numbers", "add 'compress no'")),
+])
+def test_what_would_be_wrong_without_a_word_is_refused(engine, tmp_path, change, words):
+    case = replace(Case([Log((0.0, 0.0)), Log((0.5, 0.0))], "stiffness 1e7", 1e-5, "run 1"), **change)
+    done = impact_decks.start(tmp_path, case, engine=engine)
+    assert done.code != 0 and all(word in done.error for word in words), done.error or done.output[-2000:]
+
+
+def test_deleted_logs_leave_the_others_as_they_are(run, tmp_path):
+    """Those that stay keep their attitudes; before the first run numbers may change."""
+    logs = [Log((-0.9, 0.0)), Log((0.0, 0.0), spin=(3.0, 0.0, 0.0)), Log((0.9, 0.0))]
+    case = Case(logs, f"stiffness 1e7{IN_SPACE}", 1e-4,
+                "group first id 3\ndelete_atoms group first\nrun 500\ngroup second id 1\n"
+                "delete_atoms group second compress no\nrun 500", every=500, before="")
+    found = run(tmp_path, case)
+    assert len(found.last) == 1 and found.axis()[0] == pytest.approx([0.0, -math.sin(0.3), math.cos(0.3)], abs=1e-6)
+
+
 def test_another_time_step_goes_on(run, tmp_path):
     case = Case([Log((0.0, 0.0), (1.0, 0.0)), Log((0.2 + 1e-5, 0.0))], "stiffness 1e7 theta 0.5 impacts impacts.txt", 1e-6,
                 "run 2000\ntimestep 2e-6\nrun 3000", every=1000)

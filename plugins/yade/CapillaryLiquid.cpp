@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <core/InteractionLoop.hpp>
 #include <core/Omega.hpp>
@@ -37,6 +38,11 @@ Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz* lawOf(Scene& scene) {
 				if (auto* law = dynamic_cast<Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz*>(functor.get()))
 					if (law->carriedLiquid) return law;
 	fail("CapillaryLiquid: no InteractionLoop has a Law2_ScGeom_FinnieRabinowiczPhys_FinnieRabinowicz with carriedLiquid=True");
+}
+
+/// Also of bodies that are no more: another one that stands in the same place in memory is not the same.
+bool same(const boost::weak_ptr<Body>& one, const boost::weak_ptr<Body>& other) {
+	return !one.owner_before(other) && !other.owner_before(one);
 }
 
 void checkVolume(const std::string& what, double volume) {
@@ -89,9 +95,9 @@ void CapillaryLiquid::registerNewBodies() {
 	bool come = false;
 	for (std::size_t id = 0; id < count; ++id) {
 		const shared_ptr<Body> body = bodyOf(id);
-		const bool             gone = seen[id] ? body != seen[id] : loaded && id < known && !body;
+		const bool             gone = same(seen[id], {}) ? loaded && id < known && !body : !same(seen[id], body);
 		if (loaded && id < known) seen[id] = body;
-		if (!gone && body == seen[id]) continue;
+		if (!gone && same(seen[id], body)) continue;
 		if (gone) {
 			ledger.remove(static_cast<int>(id), grains());
 			walls[id] = -1;
@@ -166,6 +172,7 @@ void CapillaryLiquid::action() {
 	number(exchange.requests);
 	number(exchange.broken);
 	ledger.give_back(exchange.broken, grains());
+	if (const long lost = FinnieRabinowiczPhys::bridgesLost; std::exchange(bridgesLost, lost) != lost) vanished = true;
 	if (vanished) reconcile();
 	ledger.form(exchange.requests, grains(), [](const LiquidExchange::Request& r, const capillary::NewBridge<double>& bridge) {
 		r.phys->setBridge(bridge.volume, bridge.imbalance, r.radius, r.other_radius);

@@ -4,6 +4,8 @@
 #include <mutex>
 #include <vector>
 
+#include <boost/weak_ptr.hpp>
+
 #include <core/Body.hpp>
 #include <core/GlobalEngine.hpp>
 
@@ -100,8 +102,9 @@ private:
 	int wallNumber(Body::id_t body) const { return 1 + walls[body]; }
 
 	::dembark::capillary::LiquidLedger ledger;
-	std::vector<shared_ptr<Body>>      seen;  // by id; kept until the next step, so that no other stands in their place in memory
-	bool                               vanished = false;  // bodies, and maybe bridges with them
+	std::vector<boost::weak_ptr<Body>> seen;  // by id; to own it could mean to end a Python object without the interpreter
+	bool                               vanished    = false;  // bodies, and maybe bridges with them
+	long                               bridgesLost = 0;      // of FinnieRabinowiczPhys, when it was last looked at
 };
 REGISTER_SERIALIZABLE(CapillaryLiquid);
 

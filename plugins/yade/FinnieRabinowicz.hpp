@@ -71,7 +71,12 @@ private:
 
 class FinnieRabinowiczPhys : public NormShearPhys {
 public:
-	virtual ~FinnieRabinowiczPhys() = default;
+	virtual ~FinnieRabinowiczPhys() {
+		if (bridgeVolume > 0.0) ++bridgesLost;
+	}
+
+	/// Bridges that did not break but went with their interaction, which a script erased, in all scenes so far.
+	inline static std::atomic<long> bridgesLost{0};
 
 	// What a dry contact takes and leaves in a step stands in the first so many bytes: from kn to dissipatedEnergy.
 	static constexpr std::size_t ofEveryStep = 192;

@@ -246,9 +246,7 @@ void LcpImpact::gatherWalls() {
 
 void LcpImpact::findContacts(double reach, std::vector<impact::Contact>& contacts) {
 	around.find(logs, reach, contacts);
-	const auto held = [&](int i) { return i < 0 || std::isinf(logs[i].mass); };
-	const auto idle = [&](const impact::Contact& c) { return held(c.a) && held(c.b); };
-	contacts.erase(std::remove_if(contacts.begin(), contacts.end(), idle), contacts.end());
+	impact::leave_out_held(logs, contacts);
 	if (plane < 0) return;
 	for (const auto& c : contacts) {
 		if (std::abs(vec(c.normal)[plane]) <= 1e-9) continue;

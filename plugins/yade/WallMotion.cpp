@@ -6,6 +6,7 @@
 #include <core/Body.hpp>
 #include <core/InteractionLoop.hpp>
 #include <core/Scene.hpp>
+#include <core/TimeStepper.hpp>
 #include <pkg/dem/NewtonIntegrator.hpp>
 
 #include "ContactView.hpp"
@@ -51,6 +52,10 @@ void WallMotion::check() const {
 		const bool early = dynamic_cast<const NewtonIntegrator*>(engine.get());
 		if (!engine->dead && ((passed && late) || (!passed && early)))
 			fail("WallMotion must stand in O.engines after InteractionLoop and EnergyAccount, and before NewtonIntegrator");
+		const auto* const stepper = dynamic_cast<const TimeStepper*>(engine.get());
+		if (passed && stepper && stepper->active && !engine->dead)
+			fail("WallMotion must stand in O.engines after " + stepper->getClassName() +
+			     ": its velocities lead to the next place in the time step of now");
 	}
 }
 

@@ -6,13 +6,14 @@
 #include <core/GlobalEngine.hpp>
 #include <core/InteractionLoop.hpp>
 #include <core/Scene.hpp>
+#include <core/TimeStepper.hpp>
 #include <pkg/dem/NewtonIntegrator.hpp>
 
 #include "report.hpp"
 
 namespace yade::dembark_yade {
 
-/// The scene's only NewtonIntegrator; fails unless `own` stands before it, and InteractionLoop before `own`.
+/// The scene's only NewtonIntegrator; fails unless `own` stands before it, and InteractionLoop and what chooses the time step before `own`.
 inline const NewtonIntegrator& integratorAfter(const Engine& own, const Scene& scene) {
 	const auto              refuse = [&own](const char* what) { fail(own.getClassName() + what); };
 	const NewtonIntegrator* found  = nullptr;
@@ -23,6 +24,9 @@ inline const NewtonIntegrator& integratorAfter(const Engine& own, const Scene& s
 		const auto* newton = dynamic_cast<const NewtonIntegrator*>(engine.get());
 		if ((newton && !passed) || (passed && dynamic_cast<const InteractionLoop*>(engine.get())))
 			refuse(" must stand in O.engines after InteractionLoop and before NewtonIntegrator");
+		if (const auto* stepper = dynamic_cast<const TimeStepper*>(engine.get()); stepper && stepper->active && passed && !found)
+			fail(own.getClassName() + " must stand in O.engines after " + stepper->getClassName() +
+			     ", which changes the time step for which it counts");
 		if (newton && found) refuse(": there is more than one NewtonIntegrator in O.engines; it needs exactly one");
 		if (newton) found = newton;
 	}

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,53 @@ def test_the_deck_runs_as_it_is(tmp_path, deck):
 def test_one_line_says_what_is_wrong(tmp_path, deck, old, new, words):
     assert old in deck
     assert_one_line(lammps_driver.run_deck(tmp_path, deck.replace(old, new, 1)), *words)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ("neighbor 0.0001 bin", ("a bridge reaches", "neighbor skin is 0.0001", "use neighbor")),
+    ("timestep 1e-3", ("with viscous_liquid a bridge", "needs a timestep <=", "not 0.001"))])
+def test_a_bridge_of_the_run_before_does_not_fit_the_next_one(tmp_path, change, words):
+    case = Scenario(name="", material=replace(WET, viscosity=0.1, minimum_gap=1e-5), steps=10,
+                    grains=(Grain(position=(0.0, 0.0, 4.999e-3)), Grain(position=(0.0, 0.0, -5e-3))))
+    assert_one_line(lammps_driver.run_deck(tmp_path, f"{lammps_driver.deck(case)}{change}\nrun 10\n"), *words)
+
+
+@pytest.mark.parametrize(("command", "words"), [
+    ("delete_atoms group gone", ("delete_atoms would give", "other numbers", "add 'compress no'")),
+    ("delete_atoms group gone compress yes", ("add 'compress no'",)),
+    ("reset_atoms id", ("reset_atoms id would give", "other numbers", "before the first run"))])
+def test_numbers_by_which_contacts_know_each_other_stay(tmp_path, deck, command, words):
+    assert_one_line(lammps_driver.run_deck(tmp_path, f"{deck}group gone empty\n{command}\nrun 1\n"), *words)
+    first = deck.replace("timestep", f"group gone empty\n{command}\ntimestep", 1)
+    for text in (first, f"{deck}group gone empty\ndelete_atoms group gone compress no\nrun 1\n"):
+        done = lammps_driver.run_deck(tmp_path, text)
+        assert done.code == 0, done.error
+
+
+@pytest.mark.parametrize("newton", ["off", "on"])
+def test_a_pair_that_touches_twice_is_refused(tmp_path, newton):
+    """Across a box of 1.2 diameters; side by side in it a pair touches once."""
+    case = Scenario(name="", material=Material(presliding="partial_slip"), steps=10,
+                    grains=(Grain(position=(0.0, 0.0, 0.003)), Grain(position=(0.0078, 0.0, 0.009))))
+    deck = lammps_driver.deck(case, newton=newton).replace("boundary f f f", "boundary f f p").replace(
+        "block -0.05 0.05 -0.05 0.05 -0.05 0.05", "block -0.05 0.05 -0.05 0.05 0 0.012")
+    assert_one_line(lammps_driver.run_deck(tmp_path, deck + "run 1\n"), "grain 1 touches grain 2 and an image of it", "two diameters")
+    done = lammps_driver.run_deck(tmp_path, deck.replace("0.0078 0.0 0.009", "0.0098 0.0 0.003") + "run 1\n")
+    assert done.code == 0, done.error
+
+
+def test_a_new_grain_does_not_take_over_the_bridge_of_a_deleted_one(tmp_path):
+    """It gets the number of that one, and is as near to its neighbour, but has not touched it."""
+    case = Scenario(name="", material=WET, steps=10, grains=(Grain(position=(0.0, 0.0, 4.9e-3)), Grain(position=(0.0, 0.0, -5e-3))))
+    new = "create_atoms 1 single 0 0 -0.0052 units box\nset atom 2 diameter 0.01 density 2500\n"
+    gone = "group gone id 2\ndelete_atoms group gone compress no\n"
+    deck = lammps_driver.deck(case)
+    done = lammps_driver.run_deck(tmp_path, f"{deck}{gone}{new}run 10\n")
+    assert_one_line(done, "atom 2 has the number of one that was deleted", "run 0")
+    force = "thermo_style custom step fmax\nthermo_modify format float %.17g\n"
+    for ranks in (1, 2):
+        done = lammps_driver.run_deck(tmp_path, f"{deck}{gone}run 0\n{new}{force}run 0\n", ranks=ranks)
+        assert done.code == 0 and done.output.rpartition("Fmax")[2].split()[:2] == ["10", "0"], done.error or done.output[-2000:]
 
 
 def test_a_wall_needs_the_pair_style(tmp_path, deck):

@@ -96,6 +96,16 @@ def test_a_run_is_the_same_to_the_bit_with_the_account_and_without(tmp_path: Pat
     assert found[0] == found[1]
 
 
+def test_the_gravity_of_an_accelerator_is_gravity(tmp_path: Path) -> None:
+    """`suffix omp` makes a fix gravity/omp where LAMMPS has the package OPENMP."""
+    text = falling("run 200")
+    weight = next(line for line in text.splitlines() if line.startswith("fix weight"))
+    plain, other = (Account(run_deck(tmp_path / name, text.replace(weight, script)))
+                    for name, script in (("plain", weight), ("omp", f"suffix omp\n{weight}\nsuffix off")))
+    other.assert_balanced()
+    assert other.gravity[-1] == plain.gravity[-1] > 0.0
+
+
 @pytest.mark.parametrize("lanes", ["8", "1"])
 def test_grains_held_in_each_other_have_no_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lanes: str) -> None:
     """In steps as in the set-ups of two runs, in packs and one by one."""
@@ -169,6 +179,7 @@ def test_resumed_account_is_the_same_to_the_bit(tmp_path: Path) -> None:
     (FIX, f"unfix motion\n{FIX}\nfix motion all nve/sphere", "must come after fix motion (nve/sphere)"),
     (FIX, f"fix other all nve\n{FIX}", "atom 1 is moved by both fix motion and fix other"),
     ("fix motion all nve/sphere", "fix motion all nve/limit 0.1", "fix motion (nve/limit) moves atoms"),
+    (FIX, f"fix squeeze all deform 1 x erate -0.1 remap v\n{FIX}", "a box of constant size and shape, and fix squeeze (deform) changes it"),
     (FIX, f"fix wall all wall/gran hooke/history 1e4 NULL 10 NULL 0.5 0 zplane 0 NULL\n{FIX}", "there is fix wall (wall/gran)"),
 ])
 def test_mistakes(tmp_path: Path, old: str, new: str, told: str) -> None:

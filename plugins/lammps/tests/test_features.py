@@ -70,7 +70,8 @@ TILTED = ("region domain block 0 0.024 0 0.024 -0.001 0.05", "region domain pris
 LEAVE = {
     "triclinic": (f"run {STEPS}", TILTED),
     "evaporate": (f"region top block INF INF INF INF 0.006 INF units box\nfix leave all evaporate 50 1 top 4711\nrun {STEPS}", ("", "")),
-    "delete_atoms": ("run 250\nregion top block INF INF INF INF 0.01 INF units box\ndelete_atoms region top\nrun 250", ("", "")),
+    "delete_atoms": ("run 250\nregion top block INF INF INF INF 0.01 INF units box\ndelete_atoms region top compress no\nrun 250",
+                     ("", "")),
 }
 
 

@@ -1,5 +1,7 @@
 """A user's mistake ends the run with one line that says what is wrong, where, and what would be right."""
 
+from dataclasses import replace
+
 import pytest
 from rig import liggghts_driver
 from rig.scenarios import Grain, Material, Scenario
@@ -150,3 +152,60 @@ def test_units_that_do_not_fit_together(tmp_path):
     """The engine refuses `real` and `metal`, but not these."""
     done = run(tmp_path, lambda deck: deck.replace("units si", "units electron"))
     assert_one_line(done, "units electron", "si, cgs, micro, nano or lj")
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    ("neighbor 0.0001 bin", ("a bridge", "neighbor")),
+    ("timestep 1e-3", ("with viscous_liquid on a bridge", "needs a time step <=", "not 0.001"))])
+def test_a_bridge_of_the_run_before_does_not_fit_the_next_one(tmp_path, change, words):
+    case = Scenario(name="on a wall", material=replace(WET, viscosity=0.1, minimum_gap=1e-5), steps=10, wall=True,
+                    grains=(Grain(position=(0.0, 0.0, 4.99e-3)),))
+    assert_one_line(liggghts_driver.run_deck(tmp_path, f"{liggghts_driver.deck(case)}{change}\nrun 10\n"), *words)
+
+
+def test_numbers_by_which_contacts_know_each_other_stay(tmp_path):
+    """Stock LIGGGHTS loses histories and bridges with them, and may find those of another pair."""
+    def with_end(end):
+        return lambda deck: f"{deck}group gone id 3\n{end}\nrun 1\n"
+
+    assert_one_line(run(tmp_path, with_end("delete_atoms group gone")), "delete_atoms would give", "other numbers", "'compress no'")
+    assert_one_line(run(tmp_path, with_end("delete_atoms group gone compress yes")), "add 'compress no'")
+    before = run(tmp_path, lambda deck: deck.replace("thermo", "group gone id 3\ndelete_atoms group gone\nthermo", 1))
+    for done in (before, run(tmp_path, with_end("delete_atoms group gone compress no"))):
+        assert done.code == 0, done.error
+
+
+def test_another_pair_style_after_a_run_is_warned_of(tmp_path):
+    def again(deck):
+        style = next(line for line in deck.splitlines() if line.startswith("pair_style"))
+        return f"{deck}{style}\npair_coeff * *\nrun 1\n"
+
+    done = run(tmp_path, again)
+    assert done.code == 0 and done.output.count("WARNING: pair_style gran: given again after a run") == 1, done.output[-2000:]
+    assert "given again" not in run(tmp_path / "once").output
+    assert "given again" not in run(tmp_path / "clear", lambda deck: f"{deck}clear\n{deck}").output
+
+
+def test_a_new_grain_does_not_take_over_the_bridge_of_a_deleted_one(tmp_path):
+    """It gets the number of that one, and is as near to its neighbour, but has not touched it."""
+    new = "create_atoms 1 single 0 0 -0.0052 units box\nset atom 2 diameter 0.01 density 2500\n"
+    gone = "group gone id 2\ndelete_atoms group gone compress no\n"
+    assert_one_line(run(tmp_path, lambda deck: f"{deck}{gone}{new}run 10\n"), "atom 2 has the number of one that was deleted", "run 0")
+    force = "variable size equal fz[2]\nfix out all print 1 \"found ${size}\" file out.txt\n"
+    done = run(tmp_path, lambda deck: f"{deck}{gone}run 0\n{new}{force}run 1\n")
+    assert done.code == 0, done.error or done.output[-2000:]
+    assert (tmp_path / "out.txt").read_text().splitlines()[-1] == "found 0"
+
+
+@pytest.mark.parametrize("lanes", ["8", "1"])
+def test_a_pair_that_touches_twice_is_refused(tmp_path, monkeypatch, lanes):
+    """Across a box of 1.2 diameters; side by side in it a pair touches once."""
+    monkeypatch.setenv("DEMBARK_LANES", lanes)
+    case = Scenario(name="", material=Material(presliding="partial_slip"), steps=10,
+                    grains=(Grain(position=(0.0, 0.0, 0.003)), Grain(position=(0.0078, 0.0, 0.009))))
+    deck = liggghts_driver.deck(case).replace("boundary f f f", "boundary f f p").replace(
+        "block -0.05 0.05 -0.05 0.05 -0.05 0.05", "block -0.05 0.05 -0.05 0.05 0 0.012").replace(
+        "neigh_modify delay 0", "neigh_modify delay 0 every 1 check no")
+    assert_one_line(liggghts_driver.run_deck(tmp_path, deck), "grain 1 touches grain 2 and an image of it", "two diameters")
+    done = liggghts_driver.run_deck(tmp_path, deck.replace("0.0078 0.0 0.009", "0.0098 0.0 0.003"))
+    assert done.code == 0, done.error

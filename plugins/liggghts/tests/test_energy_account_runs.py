@@ -220,6 +220,7 @@ STOCK = "model hertz tangential history"
     (lambda t: t.replace("nve/sphere", "nve/limit radius_ratio 0.1"), ("fix motion (nve/limit)", "only fix nve/sphere, fix nve")),
     (lambda t: t.replace(FIX, f"group one id 7\nfix push one move linear 0.1 0 0\n{FIX}"),
      ("atom 7", "fix motion and fix push", "disjoint")),
+    (lambda t: t.replace(FIX, f"fix squeeze all deform 1 x erate -0.1\n{FIX}"), ("constant size and shape", "fix squeeze (deform)")),
     (lambda t: t.replace("timestep", "run_style respa 2 2\ntimestep"), ("run_style verlet",)),
 ])
 def test_what_it_cannot_account_for_is_told(tmp_path, change, told):

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -118,7 +119,7 @@ class Coupling {
       const ContactWrench& w = wrenches_[i];
       BodyUpdate& update = gathered[order_[i]] = {w.force, w.torque, b.spin, {}};
       if (logs_.empty()) continue;
-      update.torque = command.inertia(b.mass, b.radius) * kicked(b, b.torque + w.torque, 1.0) - b.torque;
+      if (!std::isinf(b.mass)) update.torque = command.inertia(b.mass, b.radius) * kicked(b, b.torque + w.torque, 1.0) - b.torque;
       update.attitude = logs_[i].attitude;
     }
   }
@@ -198,7 +199,10 @@ class Coupling {
   void solve(std::int64_t now, double kick) {
     const double time = clock_time_ + double(now - clock_step_) * last_dt_;
     ContactGeometry& around = command.around;
-    const auto search = [&](double reach, std::vector<Contact>& contacts) { around.find(bodies_, reach, contacts); };
+    const auto search = [&](double reach, std::vector<Contact>& contacts) {
+      around.find(bodies_, reach, contacts);
+      leave_out_held(bodies_, contacts);
+    };
     report = system_.step(bodies_, search, around.wall_speed(), time, kick);
     wrenches_ = system_.wrenches();
     for (std::size_t i = 0; i < logs_.size(); ++i) {

@@ -47,6 +47,13 @@ inline double default_reach(const std::vector<Body>& bodies, double dt, double w
   return std::max(reach_factor * closing, 0.01 * radius);
 }
 
+/// Contacts of bodies of infinite mass with each other and with walls have no effect.
+inline void leave_out_held(const std::vector<Body>& bodies, std::vector<Contact>& contacts) {
+  const auto held = [&](int i) { return i < 0 || std::isinf(bodies[std::size_t(i)].mass); };
+  const auto idle = [&](const Contact& c) { return held(c.a) && held(c.b); };
+  contacts.erase(std::remove_if(contacts.begin(), contacts.end(), idle), contacts.end());
+}
+
 /// m, from the centre of a body to what of it is farthest.
 inline double extent(const Body& b) { return has_length(b) ? b.radius + norm(b.half_axis) : b.radius; }
 

@@ -351,6 +351,7 @@ def messages():
     heard("two integrators", lambda account: engines(lambda e: [*e, NewtonIntegrator()]))
     heard("before the loop", lambda account: engines(lambda e: [e[0], e[4], *e[1:4], e[5]]))
     heard("after the integrator", lambda account: engines(lambda e: [*e[:4], e[5], e[4]]))
+    heard("time step", lambda account: engines(lambda e: [*e[:5], GlobalStiffnessTimeStepper(), e[5]]))
     heard("density scaling", scaled)
     heard("clump", lambda account: O.bodies.clump([0, 1]))
     heard("aspherical", lambda account: setattr(O.bodies[0], "aspherical", True))

@@ -121,7 +121,19 @@ def erased():
     O.step()
     before = tallies(engine, 3)
     O.bodies.erase(1)
+    O.run(1, True)  # in a thread of its own, without Python's lock
+    return [before, tallies(engine, 3)]
+
+
+def cleared():
+    """A script ends all interactions; the grains still touch."""
+    engine = scene_with([held((0, 0, 0)), held((TOUCH, 0, 0)), held((-TOUCH, 0, 0))])
+    for k in range(3):
+        engine.setVolume(k, 1e-10)
     O.step()
+    before = tallies(engine, 3)
+    O.interactions.clear()
+    O.run(2, True)
     return [before, tallies(engine, 3)]
 
 

@@ -259,6 +259,9 @@ def messages():
     def last():
         O.engines = [O.engines[-1], *O.engines[:-1]]
 
+    def stepped():
+        O.engines = [*O.engines, GlobalStiffnessTimeStepper()]
+
     def freed():
         O.bodies[0].dynamic = True
 
@@ -270,6 +273,7 @@ def messages():
     return {"word": trial("shake 1"), "zero": trial("harmonic amplitude 0 0 1e-3 frequency 0"), "back": trial("table file back.csv"),
             "short": trial("jolts shape half_sine acceleration 1 0 0 duration 2e-5"),
             "fast": trial("harmonic amplitude 0 0 1e-3 frequency 20000"), "order": trial(change=last),
+            "step": trial(change=stepped),
             "free": trial(change=freed), "empty": moving([]), "strangers": [moving([body]) for body in (-1, 77, 10**6)]}
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-SCENES = ("sequence many_at_once wall erased reused_id rolling_over_facets erased_facet both_fixed conserved save_load history "
+SCENES = ("sequence many_at_once wall erased cleared reused_id rolling_over_facets erased_facet both_fixed conserved save_load history "
           "messages").split()
 
 
@@ -76,6 +76,13 @@ def test_erased_body_takes_its_own_and_no_more(found):
     assert after["grains"][0] == pytest.approx(before["grains"][0] + 0.5 * bridge, rel=1e-13)
     assert after["count"] == before["count"] - 1 == 1
     assert after["total"] == pytest.approx(3e-10, rel=1e-14)
+
+
+def test_interactions_that_a_script_ends_give_their_liquid_back(found):
+    before, after = found["cleared"]
+    assert after["count"] == before["count"] == 2
+    assert after["bridges"] == pytest.approx(sum(after["volumes"].values()), rel=1e-13)
+    assert after["grains"] == pytest.approx(before["grains"], rel=1e-13) and after["total"] == pytest.approx(3e-10, rel=1e-14)
 
 
 def test_body_at_the_id_of_an_erased_one_is_a_new_one(found):

@@ -265,6 +265,7 @@ def test_table_and_mapping(found):
 SAID = {"no integrator": ("no NewtonIntegrator", "exactly one"), "two integrators": ("more than one NewtonIntegrator", "exactly one"),
         "before the loop": ("after InteractionLoop and before NewtonIntegrator",),
         "after the integrator": ("after InteractionLoop and before NewtonIntegrator",), "density scaling": ("densityScaling", "False"),
+        "time step": ("after GlobalStiffnessTimeStepper", "changes the time step"),
         "clump": ("body 0", "clump", "single spheres"), "aspherical": ("body 0", "aspherical", "exactAsphericalRot to False"),
         "cell": ("cell deforms", "velGrad"), "missed": ("expected step 1", "step 2", "reset()"),
         "unknown": ("'heat'", "kinetic, first_kinetic")}

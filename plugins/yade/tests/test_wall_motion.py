@@ -136,6 +136,7 @@ def test_a_motion_that_was_left_out_for_steps_ends_the_run(found):
     ("word", "there is no motion 'shake'"), ("fast", "below ten time steps"), ("short", "below ten time steps"),
     ("zero", "frequency 0 must be > 0"), ("back", "file 'back.csv', line 3: the times do not ascend"),
     ("order", "must stand in O.engines after InteractionLoop"),
+    ("step", "must stand in O.engines after GlobalStiffnessTimeStepper"),
     ("free", "follows its forces"), ("empty", "ids is empty")])
 def test_wrong_motions_are_told_in_one_line(found, name, line):
     assert found["messages"][name].startswith("dembark: ") and line in found["messages"][name]
