@@ -1,5 +1,6 @@
 #include "atom_numbers.h"
 
+#include <map>
 #include <memory>
 #include <string>
 
@@ -20,7 +21,7 @@ using namespace LAMMPS_NS;
 namespace dembark_lammps {
 namespace {
 
-dembark_family::DeletedAtoms deleted_atoms;
+std::map<const LAMMPS*, dembark_family::DeletedAtoms> deleted_atoms;
 
 std::string wrong_with_delete(const LAMMPS& lammps, int narg, char** arg) {
   return dembark_family::new_numbers_error(*lammps.atom, *lammps.update, narg, arg);
@@ -31,7 +32,7 @@ std::string wrong_with_reset(const LAMMPS& lammps, int, char**) {
   return "reset_atoms id would give the atoms other numbers, by which contacts and logs know each other; do it before the first run";
 }
 
-std::string wrong_with_run(const LAMMPS& lammps, int, char**) { return deleted_atoms.run_error(*lammps.atom, lammps.world); }
+std::string wrong_with_run(const LAMMPS& lammps, int, char**) { return deleted_atoms[&lammps].run_error(*lammps.atom, lammps.world); }
 
 /// In front of a command of LAMMPS. A creator has no data of its own, so there is a class for each.
 template <std::string (*wrong_with)(const LAMMPS&, int, char**)>
@@ -44,9 +45,9 @@ class Guarded : public Command {
     const std::string wrong = by_number ? wrong_with(*lmp, narg, arg) : "";
     if (!wrong.empty()) error->all(FLERR, wrong);
     const auto original = [&] { std::unique_ptr<Command>(original_(lmp))->command(narg, arg); };
-    if (wrong_with == &wrong_with_delete && by_number && update->first_update) return deleted_atoms.watch(*atom, world, original);
+    if (wrong_with == &wrong_with_delete && by_number && update->first_update) return deleted_atoms[lmp].watch(*atom, world, original);
     original();
-    if (wrong_with == &wrong_with_run) deleted_atoms.clear();
+    if (wrong_with == &wrong_with_run) deleted_atoms[lmp].clear();
   }
 
   static void enter(Input& input, const char* name) {
@@ -65,7 +66,7 @@ class Guarded : public Command {
 }  // namespace
 
 void keep_numbers(LAMMPS* lammps) {
-  deleted_atoms.clear();
+  deleted_atoms[lammps].clear();
   Guarded<wrong_with_run>::enter(*lammps->input, "run");
   Guarded<wrong_with_delete>::enter(*lammps->input, "delete_atoms");
   Guarded<wrong_with_reset>::enter(*lammps->input, "RESET_ATOMS_ID");  // of the command reset_atoms id

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -39,7 +40,7 @@ namespace {
 
 bool entered = false;  // the styles are in the library's tables
 dembark_liggghts::CommandCreator stock_run = nullptr, stock_delete_atoms = nullptr;
-dembark_family::DeletedAtoms deleted_atoms;
+std::map<const LAMMPS_NS::LAMMPS*, dembark_family::DeletedAtoms> deleted_atoms;
 
 template <class Style>
 LAMMPS_NS::Fix* create_fix(LAMMPS_NS::LAMMPS* lammps, int narg, char** arg) {
@@ -62,10 +63,10 @@ void start_alone() {
 /// out. Atoms that a script creates in between overwrite the ghosts, and contacts across borders would lose their histories. Runs of stock
 /// models stay as they are in stock LIGGGHTS.
 void run_and_keep_histories(LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
-  const std::string wrong = deleted_atoms.run_error(*host->atom, host->world);
+  const std::string wrong = deleted_atoms[host].run_error(*host->atom, host->world);
   if (!wrong.empty()) host->error->all(FLERR, wrong.c_str());
   stock_run(host, narg, arg);
-  deleted_atoms.clear();
+  deleted_atoms[host].clear();
   if (!dembark_liggghts::has_our_models(*host->force)) return;
   for (int i = 0; i < host->modify->nfix; ++i)
     if (!std::strcmp(host->modify->fix[i]->style, "contacthistory")) host->modify->fix[i]->setup_pre_exchange();
@@ -76,7 +77,8 @@ void delete_and_keep_numbers(LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
   const bool by_number = dembark_liggghts::has_our_models(*host->force) || host->modify->find_fix_style("lcp/impact", 0);
   const std::string wrong = by_number ? dembark_family::new_numbers_error(*host->atom, *host->update, narg, arg) : "";
   if (!wrong.empty()) host->error->all(FLERR, wrong.c_str());
-  if (by_number && host->update->first_update) deleted_atoms.watch(*host->atom, host->world, [&] { stock_delete_atoms(host, narg, arg); });
+  if (by_number && host->update->first_update)
+    deleted_atoms[host].watch(*host->atom, host->world, [&] { stock_delete_atoms(host, narg, arg); });
   else stock_delete_atoms(host, narg, arg);
 }
 
@@ -84,7 +86,7 @@ void delete_and_keep_numbers(LAMMPS_NS::LAMMPS* host, int narg, char** arg) {
 void enter_styles(LAMMPS_NS::LAMMPS& host) {
   if (!host.modify || !host.force || !host.input) return;
   LAMMPS_NS::ResumeState::file.forget(&host);
-  deleted_atoms.clear();
+  deleted_atoms[&host].clear();
   dembark_liggghts::register_contact_models();
   auto& fixes = dembark_liggghts::fix_styles(*host.modify);
   // In place of the stock style, of the same name.
