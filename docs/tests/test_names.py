@@ -110,7 +110,7 @@ def test_options_in_the_text_exist() -> None:
     common = {option for parameter in typer.main.get_command(cli.app).params for option in parameter.opts}
     known = common.union(*subcommands().values()) | set(re.findall(r'"(--[a-z-]+)"', benchmarks))
     # Words of other programs: of Slurm, srun, pytest and containers.
-    known |= {"--partition", "--mpi", "--me", "--test-only", "--slow", "--full", "--bind", "--cleanenv"}
+    known |= {"--partition", "--output", "--mpi", "--me", "--test-only", "--slow", "--full", "--bind", "--cleanenv"}
     unknown = {option for span in SPANS for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", span)} - known
     assert not unknown
 
