@@ -35,7 +35,7 @@ inline std::string double_contact_error(const LAMMPS_NS::NeighList& list, const 
   const auto same = std::adjacent_find(contacts.begin(), contacts.end());
   if (same == contacts.end()) return "";
   return "grain " + std::to_string(same->first) + " touches grain " + std::to_string(same->second) +
-         " and an image of it, and their histories cannot be told apart; take a periodic box longer than two diameters";
+         " and an image of it, and their histories cannot be distinguished; take a periodic box longer than two diameters";
 }
 
 }  // namespace dembark_family
