@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from dembark.common.choices import pick
-from dembark.common.errors import DembarkError, RunError
+from dembark.common.errors import DembarkError, RunError, pasteable
 from dembark.common.extras import missing_extra
 from dembark.common.parallel import cores_here
 from dembark.common.units import seconds
@@ -171,6 +171,12 @@ def make_report(
     outcome = workflow.conclude(folder, workflow.cancelled_by_signal(), cores_here())
     for line in outcome.problems:
         show.console().print(f"problem: {line}", markup=False, style="red", soft_wrap=True)
+    if old := workflow.outdated(folder):
+        campaign = ("dembark", "resume", folder)
+        again = campaign if (folder / CAMPAIGN_FILE).is_file() else ("dembark", "validate", "--profile", profile, "--results", results)
+        more = f" and {len(old) - 1} more" if len(old) > 1 else ""
+        print(f"dembark: the runs of {' '.join(old[0].parts)}{more} are of another case, deck or engine than those of now; make them again "
+              f"with {pasteable(*again)}", file=sys.stderr)
     show.console().print(f"{folder / 'report.html'}\n{folder / 'report.pdf'}", markup=False, soft_wrap=True)
 
 

@@ -19,13 +19,14 @@ from dembark.common.signals import ENDING, interruptible
 from dembark.validation import results
 from dembark.validation.campaigns import expand
 from dembark.validation.campaigns.plan import Plan, Resources, Series
+from dembark.validation.campaigns.spec import read
 from dembark.validation.judge.result import METRICS, PLAN, Result
 from dembark.validation.judge.tally import Tally, of_folder
 from dembark.validation.results import RECORD, State
 
 from .executor import Executor, States, Task
 from .monitor import Monitor
-from .steps import Step, build_report, measure_series, steps
+from .steps import CAMPAIGN_FILE, Step, build_report, measure_series, steps
 
 LOCK = ".lock"
 
@@ -93,6 +94,18 @@ def conclude(folder: Path, cancel: threading.Event, cores: int) -> Outcome:
         with interruptible(*ENDING):
             build_report(folder)
         return outcome
+
+
+def outdated(folder: Path) -> list[Path]:
+    """Places of the series in a results folder that were run with other inputs than case.toml, deck and engine give now; empty where the
+    plan cannot be made any more, as without an engine."""
+    made = {run["folder"]: run["inputs"] for run in results.plan(folder).get("runs", ())}
+    try:
+        now = expand.campaign(read(folder / CAMPAIGN_FILE)) if (folder / CAMPAIGN_FILE).is_file() else expand.profile(folder.name)
+    except DembarkError:
+        return []
+    other = [Path(place).parent for place, run in now.folders.items() if made.get(place, run.inputs) != run.inputs]
+    return sorted(dict.fromkeys(other))
 
 
 def _execute(folder: Path, tasks: Sequence[Task], todo: Sequence[Step], cancel: threading.Event, cores: int, memory: float | None = None,

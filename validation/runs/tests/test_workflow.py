@@ -12,6 +12,7 @@ import pytest
 from harness import command, decks, engine_pid, environment, lives, stand_in, stand_in_analysis, start, wait_for  # noqa: F401
 
 from dembark.common.files import read_json
+from dembark.validation import engines
 from dembark.validation.campaigns.plan import of_profile, studies
 from dembark.validation.case import folders
 from dembark.validation.judge.result import result_files, unplanned
@@ -54,6 +55,21 @@ def test_all_runs_then_none_again_then_only_what_changed(tmp_path: Path, command
     assert code == 0 and error.count("already finished; reusing") == 2 and error.count("1: finished in") == 1
     assert sum(path.stat().st_mtime_ns != before for path, before in made.items()) == 1
     assert read_json(results / "box/wet/liggghts/metrics.json")["parameters"]["grain_count"] == 12
+
+
+def test_a_report_of_old_runs_names_those_that_would_be_made_otherwise_now(command: Command, decks: Path, stand_in: Path) -> None:
+    assert command("validate")[0] == 0
+    assert command("report")[2] == ""
+    set_default(decks, "wet", "grain_count = 12")
+    code, _, error = command("report")
+    assert code == 0 and error == ("dembark: the runs of box wet liggghts are of another case, deck or engine than those of now; make them "
+                                   "again with 'dembark validate --profile quick --results results'\n")
+    stand_in.write_bytes(stand_in.read_bytes() + b"# another version\n")
+    engines.find.cache_clear()
+    assert "box dry liggghts and 2 more are of another" in command("report")[2]
+    # What cannot be planned has no such line.
+    (decks / "box" / "case.toml").write_text("")
+    assert "of another case" not in command("report")[2]
 
 
 STUDY = """[variants.large]
