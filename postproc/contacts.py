@@ -21,6 +21,8 @@ _WIDTHS = {"first": 3, "second": 3, "branch": 3, "ids": 2, "forces": 3}
 _DECK: Mapping[str, Column] = {"first": (1, 2, 3), "second": (4, 5, 6), "ids": (7, 8), "forces": (10, 11, 12)}
 _DECK_COLUMNS = 12
 _SAME = 1e-4  # of a branch, which six digits of a place hold
+_ENOUGH = 10  # contacts, for a pair may well hang on a bridge
+_PULLING = 0.9  # of the virial, which is 1 of repulsive forces on the wrong grain and -1 on the right one
 _NUMBERED = re.compile(r"\w+\[(\d+)\]")
 # What local/gran/vtk writes.
 _LINES: Mapping[str, Column] = {"first": ("x1", "y1", "z1"), "second": ("x2", "y2", "z2"), "ids": ("id1", "id2"),
@@ -97,6 +99,9 @@ class ContactsDump(TypedDump[ContactFrame]):
         if not self._looked and len(ids) and (twice := _listed_twice(ids, branch)):
             self._say(raw.step, f"the contact of grains {twice[0]} and {twice[1]} is listed twice, and counts twice, in stresses too; "
                       "list each pair once")
+        if not self._looked and _attracts(branch, parts["forces"]):
+            self._say(raw.step, "nearly all forces point from grain 1 to grain 2: if they are those on grain 2, stresses have the wrong "
+                      "sign; exchange the places of the grains with columns=")
         self._looked |= len(ids) > 0
         style = unit_style(raw.units, where)
         factors = {name: style.factor(name) for name in extra}
@@ -106,6 +111,12 @@ class ContactsDump(TypedDump[ContactFrame]):
             extra = {name: values * (factors[name] or 1.0) for name, values in extra.items()}
         return ContactFrame(raw.step, style.length * parts["first"], style.length * branch, style.force * parts["forces"],
                             ids, extra)
+
+
+def _attracts(branch: Array, forces: Array) -> bool:
+    """Whether the contacts pull, each weighed by its force times its branch: dry grains push, and among wet ones the loads push."""
+    pull = np.einsum("ij,ij->i", forces, branch)
+    return len(pull) >= _ENOUGH and bool(pull.sum() > _PULLING * np.abs(pull).sum())
 
 
 def _listed_twice(ids: NDArray[np.int64], branch: Array) -> tuple[int, int] | None:

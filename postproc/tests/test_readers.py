@@ -112,3 +112,26 @@ def test_contacts_that_are_listed_twice_are_reported(tmp_path):
         assert read(np.vstack([first, second[1:]]), np.vstack([second, first[1:]]), [*ids, [8, 3]], np.vstack([forces, -forces[1:]]))
     # In a box of few grains, a pair may touch through a face, too.
     assert read([[0.001, 0, 0]] * 2, [[0.012, 0, 0], [0.015, 0, 0]], [[3, 7]] * 2, forces) == ()
+
+
+def test_forces_that_seem_to_be_those_on_the_other_grain_are_reported(tmp_path):
+    """Forces on grain 2, as other programs may write them, give stresses of the wrong sign."""
+    path, count = tmp_path / "contacts.dump", 20
+    rng = np.random.default_rng(3)
+    first, branch = rng.uniform(size=(count, 3)), rng.normal(size=(count, 3))
+    second, ids = first + branch, [[k, k + 100] for k in range(1, count + 1)]
+    box = {"box": ((-9.0, 9.0),) * 3, "flags": "ff ff ff"}
+
+    def read(forces, rows=count):
+        path.write_text(contacts_text(5, first[:rows], second[:rows], ids[:rows], forces[:rows], **box))
+        dump = ContactsDump(path)
+        assert len(dump[0].ids) == rows
+        return dump.remarks
+
+    push = -rng.uniform(1.0, 2.0, (count, 1)) * branch + 0.1 * np.cross(branch, (1.0, 0.0, 0.0))  # with friction
+    assert read(push) == ()
+    with pytest.warns(DumpWarning, match="nearly all forces point from grain 1 to grain 2: if they are those on grain 2"):
+        assert read(-push)
+    # Grains that bridges pull together push as much; two may hang on one.
+    assert read(np.where(np.arange(count)[:, None] % 2, push, -push)) == ()
+    assert read(-push, rows=2) == ()
