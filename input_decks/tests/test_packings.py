@@ -16,7 +16,7 @@ from dembark.validation.case.resolve import for_replica, resolve
 LEAST = 5
 # Cases whose bodies begin at random places, or with random sizes, so that their numbers are those of one packing.
 RANDOM = ("column_collapse", "debarking_drum", "gravity_channel", "log_pile", "plane_silo", "plug_flow", "silo")
-# Cases that may have fewer, with the reason.
+# Cases, or variants of one, that may have fewer, with the reason.
 FEWER = {
     "triaxial": "a lattice has no packing; the disordered grains have five",
     "rotating_drum": "a drum that turns steadily forgets its packing: intervals come from blocks of its time; `full` has three packings",
@@ -26,6 +26,9 @@ FEWER = {
     "penetration": "a bed costs minutes to settle, and the published packings scatter by less than half of the tolerances",
     "avalanche": "single grains have no packing, and chutes flow steadily; the avalanches themselves have five",
     "dam_break_cubes": "its single runs have nothing random; those that have, stacks in both engines, are five",
+    "plug_flow/glass_slippery": "one input of `glass` is changed, for U_input; intervals come from blocks of time",
+    "plug_flow/glass_gripping": "the same",
+    "plug_flow/glass_thin": "the same",
     "vibrated_layer": "waves forget the packing within tens of periods: intervals come from windows of time",
 }
 
@@ -55,7 +58,7 @@ def test_cases_with_a_seed_are_the_random_ones_and_have_replicas() -> None:
 
 @pytest.mark.parametrize("name", sorted(name for name, case in discover().items() if "replicas" in case.parameters))
 def test_standard_has_five_packings_in_each_engine(name: str) -> None:
-    assert [run for run in too_few(discover()[name]) if name not in FEWER] == []
+    assert [run for run in too_few(discover()[name]) if not {name, f"{name}/{run[1]}"} & FEWER.keys()] == []
 
 
 def test_fewer_are_found(tmp_path) -> None:
