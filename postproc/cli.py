@@ -200,7 +200,7 @@ def walls(
         from .plots import save, wall_figures
 
         written += save(plot, {name: figure for one in results for name, figure in wall_figures(one).items()})
-    say([*chosen.lines(diameters), *loads.mesh_notes(), *(f"note: {one}; add --wall" for one in loads.notes),
+    say([*chosen.averaging_notes(), *chosen.lines(diameters), *loads.mesh_notes(), *(f"note: {one}; add --wall" for one in loads.notes),
           *(line for one in results for line in wall_lines(one, opened)), *(f"written: {path}" for path in written)])
 
 

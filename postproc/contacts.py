@@ -95,14 +95,15 @@ class ContactsDump(TypedDump[ContactFrame]):
         branch = parts["branch"] if "branch" in parts else less_edges(parts["second"] - parts["first"], raw)
         extra |= {name: values for name, values in parts.items() if name not in _WIDTHS}
         ids = integers(parts["ids"], f"{where}: ids")
-        # Whoever lists each pair twice does so in every frame: one is enough, for this takes as long as reading it.
+        # Whoever lists each pair twice does so in every frame: those up to the first that is not nearly empty are enough, for this takes as
+        # long as reading them.
         if not self._looked and len(ids) and (twice := _listed_twice(ids, branch)):
             self._say(raw.step, f"the contact of grains {twice[0]} and {twice[1]} is listed twice, and counts twice, in stresses too; "
                       "list each pair once")
         if not self._looked and _attracts(branch, parts["forces"]):
             self._say(raw.step, "nearly all forces point from grain 1 to grain 2: if they are those on grain 2, stresses have the wrong "
                       "sign; exchange the places of the grains with columns=")
-        self._looked |= len(ids) > 0
+        self._looked |= len(ids) >= _ENOUGH
         style = unit_style(raw.units, where)
         factors = {name: style.factor(name) for name in extra}
         if style != unit_style("si", where):

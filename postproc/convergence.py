@@ -85,6 +85,9 @@ def convergence(h: Sequence[float], values: Sequence[float], halves: Sequence[fl
     ratio = sizes[1] / sizes[0]
     change, joint = found[0] - found[1], math.hypot(spread[0], spread[1])
     bound = SAFETY_UNSEEN_ORDER * (abs(change) + joint) / (ratio**formal_order - 1.0)
+    if not change and not joint:
+        # Equal values hide the change between them: only the range of all says how much one may be (Eça & Hoekstra 2014).
+        bound = SAFETY_UNSEEN_ORDER * (max(found) - min(found))
     if abs(change) <= joint or (len(rows) > 2 and abs(found[1] - found[2]) <= math.hypot(spread[1], spread[2])):
         return Convergence("scatter", None, None, bound)
     if len(rows) < 3:

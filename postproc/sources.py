@@ -15,6 +15,7 @@ from dembark.common.files import read_json
 
 from .contacts import ContactFrame, ContactsDump
 from .dumps import DumpError
+from .dumps.frames import cell
 from .grains import GrainFrame, GrainsDump
 from .walls import CylinderWall, Motion, PlaneWall, Wall
 
@@ -157,6 +158,21 @@ class Selection:
     numbers: Sequence[int]
     first: GrainFrame
     diameter: float
+
+    def averaging_notes(self) -> list[str]:
+        """Lines about what makes a mean over the frames another than that over time, or fields wrong at faces of the box."""
+        notes, grains = [], self.source.grains
+        times = grains.times if np.isfinite(grains.times).all() else grains.steps
+        between = np.diff(times[list(self.numbers)])
+        if len(between) and np.ptp(between) > 0.01 * between.max():
+            unit = "s" if times is grains.times else "steps"
+            notes.append(f"note: frames lie {between.min():.4g} to {between.max():.4g} {unit} apart; means are over frames, not over time")
+        begin, end = (grains[number] for number in (self.numbers[0], self.numbers[-1]))
+        edges = cell(begin.low, begin.high, begin.tilt)
+        if np.any(np.abs(cell(end.low, end.high, end.tilt) - edges)[begin.periodic] > 1e-6 * edges.max()):
+            notes.append("note: the periodic box changes its shape; velocities, and powers of contacts across its faces, lack the speed of "
+                         "one face past the other, and fields are wrong up to a kernel's width from these")
+        return notes
 
     def lines(self, diameters: Sequence[float]) -> list[str]:
         """What was read; `diameters` (m) are the mean ones of the frames."""

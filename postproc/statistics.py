@@ -200,12 +200,14 @@ def combined(parts: Sequence[float]) -> float:
 def over_replicas(estimates: Sequence[Estimate]) -> Estimate:
     """One estimate from those of the replicas: Student's interval over replicas from three on, else their own intervals pooled.
 
-    Two values say little about a spread (t = 12.7 with one degree of freedom); their interval reaches to both at least.
+    Two values say little about a spread (t = 12.7 with one degree of freedom); their interval reaches to both at least. Values that are all
+    equal, such as counts of nothing, show no spread: then their own intervals count, where they have such.
     """
-    if len(estimates) >= 3:
-        return replica_mean([one.value for one in estimates])
-    mean = float(np.mean([one.value for one in estimates]))
-    half = max(combined([one.half for one in estimates]) / len(estimates), *(abs(one.value - mean) for one in estimates))
+    values, pooled = [one.value for one in estimates], combined([one.half for one in estimates]) / len(estimates)
+    if len(estimates) >= 3 and not (len(set(values)) == 1 and 0.0 < pooled < math.inf):
+        return replica_mean(values)
+    mean = float(np.mean(values))
+    half = max(pooled, *(abs(value - mean) for value in values))
     plural = "" if len(estimates) == 1 else "s"
     return Estimate(mean, half, f"within {len(estimates)} replica{plural}: {estimates[0].basis}")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,7 +18,7 @@ from MDAnalysis.lib.util import store_init_arguments
 from MDAnalysis.topology.base import TopologyReaderBase
 from numpy.typing import NDArray
 
-from .dumps.frames import Array, DumpError, cell
+from .dumps.frames import Array, DumpError, DumpWarning, cell
 from .dumps.series import listed
 from .grains import GrainFrame, GrainsDump
 
@@ -118,6 +120,14 @@ class GrainsReader(ReaderBase):
         self.n_frames = len(steps)
         self.ts = self._Timestep(self.n_atoms, **self._ts_kwargs)
         self._read_frame(0)
+        self._warn_of_walls()
+
+    def _warn_of_walls(self) -> None:
+        frame = self.ts.data["frame"]
+        walled = [axis for axis, periodic in zip("xyz", frame.periodic, strict=True) if not periodic]
+        if 0 < len(walled) < 3:
+            warnings.warn(f"{self._grains.dump.path}: the box is not periodic along {' and '.join(walled)}, but MDAnalysis takes it for "
+                          "periodic there: neighbours across these faces are none", DumpWarning, stacklevel=2)
 
     def _read_frame(self, frame: int) -> Any:
         if not 0 <= frame < self.n_frames:
@@ -134,8 +144,7 @@ class GrainsReader(ReaderBase):
             ts.velocities = self._spread(grains.velocities, present)
         if grains.has("forces"):
             ts.forces = self._spread(grains.forces, present)
-        edges = cell(grains.low, grains.high, grains.tilt)
-        ts.dimensions = triclinic_box(*edges) if grains.tilt.any() else [*np.diag(edges), 90.0, 90.0, 90.0]
+        ts.dimensions = _dimensions(grains)
         ts.data["step"] = grains.step
         ts.data["time"] = float(self._times[frame])
         ts.data["frame"] = grains
@@ -161,11 +170,22 @@ class GrainsReader(ReaderBase):
         """Nothing stays open between frames."""
 
 
+def _dimensions(grains: GrainFrame) -> Sequence[float] | Array | None:
+    """The box as MDAnalysis has it, which takes every axis for periodic: without a periodic one there is none."""
+    if not grains.periodic.any():
+        return None
+    edges = cell(grains.low, grains.high, grains.tilt)
+    return triclinic_box(*edges) if grains.tilt.any() else [*np.diag(edges), 90.0, 90.0, 90.0]
+
+
 def universe(path: str | Path, time_step: float = 1.0, **kwargs: Any) -> MDAnalysis.Universe:
     """MDAnalysis Universe of a dump of grains, for its selections and analysis classes; keywords are those of GrainsReader.
 
     For example `universe(path).select_atoms("type 1 and prop z > 0.05")`. The same as
     `MDAnalysis.Universe(path, format="DEMGRAINS", time_step=time_step)`, once this function is imported.
+
+    MDAnalysis takes every axis of `dimensions` for periodic. So these are None for a box without a periodic axis, and a warning names the
+    axes of another box that are not: there, MDAnalysis finds neighbours across walls. `ts.data["frame"]` has the box of the dump.
     """
     name = str(path)
     return MDAnalysis.Universe(name, name, topology_format="DEMGRAINS", format="DEMGRAINS", time_step=time_step, **kwargs)

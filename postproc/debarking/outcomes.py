@@ -18,6 +18,8 @@ from .laws import ForceRange, RemovalLaw, force_bound
 
 Array = NDArray[np.float64]
 
+# Events expected at most, with 97.5 % confidence, where none was seen (F. Garwood, Biometrika 28 (1936) 437).
+_NONE_SEEN = -math.log(0.025)
 _SPANS = 4  # of a revolution, whose scatter makes the intervals
 CLEAN = 0.9  # the degree of debarking of the time to it
 
@@ -107,6 +109,11 @@ def _values(result: Outcome) -> dict[str, Estimate]:
     useful, damaging, friction, excess = (table.sum(axis=(1, 2)) for table in (found.useful, found.damaging, found.friction, found.excess))
     blocks = time_blocks(useful + damaging) if len(useful) >= 4 else None
 
+    def counted(series: Array) -> Estimate:
+        if blocks is not None and not series.any():
+            return Estimate(0.0, _SPANS * _NONE_SEEN / len(series) / count, "none seen, which bounds a Poisson rate")
+        return rate(series, count)
+
     def rate(series: Array, scale: float) -> Estimate:
         return over(lambda keep: _SPANS * float(series[keep].mean()) / scale)
 
@@ -114,6 +121,12 @@ def _values(result: Outcome) -> dict[str, Estimate]:
         if blocks is None:
             return Estimate(measure(np.ones(len(useful), bool)), math.inf, "less than a revolution")
         return resampled(lambda keep, _: measure(keep), blocks)
+
+    def share() -> Estimate:
+        seen = float(useful.sum() + damaging.sum())
+        if blocks is not None and seen and not damaging.any():
+            return Estimate(0.0, -math.expm1(-_NONE_SEEN / seen), "none seen, which bounds the share")
+        return over(damaging_share)
 
     def damaging_share(keep: NDArray[np.bool_]) -> float:
         total = useful[keep].sum() + damaging[keep].sum()
@@ -125,8 +138,10 @@ def _values(result: Outcome) -> dict[str, Estimate]:
         hit = mean > 0.0
         return float((per_sector.var(axis=1, ddof=1)[hit] / mean[hit]).mean()) if hit.any() else math.nan
 
-    values = {"useful_impacts": rate(useful, count), "damaging_impacts": rate(damaging, count), "damaging_share": over(damaging_share),
-              "friction_work": rate(friction, logs.surface), "wood_loss_index": rate(excess, float(logs.masses.sum()))}
+    loss = rate(excess, float(logs.masses.sum()))
+    values = {"useful_impacts": counted(useful), "damaging_impacts": counted(damaging), "damaging_share": share(),
+              "friction_work": rate(friction, logs.surface),
+              "wood_loss_index": loss if damaging.any() else Estimate(loss.value, math.inf, "no damaging impact was seen")}
     if found.useful.shape[2] > 1:
         values["sector_dispersion"] = over(dispersion)
     if result.law is not None:

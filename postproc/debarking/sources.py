@@ -58,7 +58,10 @@ def load_of(file: Path, given: Given) -> Load:
     impacts, period = read_impacts(file), 2.0 * math.pi / speed
     if not len(impacts):
         raise DembarkError(f"{file} holds no impact")
-    begin, end = given.begin, given.end if given.end is not None else _last(impacts, record)
+    last = _last(impacts, record)
+    begin, end = given.begin, last if given.end is None else given.end
+    if "steps" in record and end > last * (1.0 + 1e-9):
+        raise DembarkError(f"the window of {file} ends at {end:g} s, its run at {last:g} s", "", "give an earlier --end, or leave it out")
     if end - begin < 0.25 * period:
         raise DembarkError(f"the window of {file} from {begin:g} to {end:g} s is less than a quarter of a revolution ({period:.3g} s)")
     return Load(_counted(impacts, record), _logs(file, given), begin, end, period, given.least_speed, given.stiffness,

@@ -8,9 +8,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ..grains import GrainFrame
 
 Array = NDArray[np.float64]
 
@@ -322,11 +326,11 @@ def before_tilt(low: Array, high: Array, tilt: Array) -> tuple[Array, Array]:
     return low - np.array(least), high - np.array(most)
 
 
-def less_edges(vectors: Array, raw: RawFrame) -> Array:
+def less_edges(vectors: Array, box: RawFrame | GrainFrame) -> Array:
     """The vectors (m, 3) less full edges of the box along its periodic axes: between nearest images."""
-    edges, result = cell(raw.low, raw.high, raw.tilt), vectors.copy()
+    edges, result = cell(box.low, box.high, box.tilt), vectors.copy()
     for axis in (2, 1, 0):
-        if raw.periodic[axis]:
+        if box.periodic[axis]:
             result -= np.round(result[:, axis] / edges[axis, axis])[:, None] * edges[axis]
     return result
 

@@ -27,7 +27,8 @@ Index = NDArray[np.int64]
 
 _IMAGE = 200.0  # bytes of a grain or contact, and of each of its periodic images, while it is spread
 _MOST_THREADS = 64
-_TOUCHING = 1e-6  # gap over the sum of the radii up to which spheres touch: what six digits of a dump leave
+_TOUCHING = 1e-6  # gap over the sum of the radii up to which spheres touch
+_DIGITS = 6  # of numbers in dumps whose format nobody set
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +171,18 @@ def _touching(grains: GrainFrame, contacts: ContactFrame | None) -> tuple[NDArra
     if contacts is None or len(contacts.ids) == 0:
         return np.zeros(0, bool), np.zeros((0, 2), np.int64)
     pairs = rows_of(grains.ids, contacts.ids, contacts.step)
-    reach = (grains.radii[pairs[:, 0]] + grains.radii[pairs[:, 1]]) * (1.0 + _TOUCHING)
+    reach = (grains.radii[pairs[:, 0]] + grains.radii[pairs[:, 1]]) * (1.0 + _TOUCHING) + 2.0 * np.sqrt(3.0) * _rounding(contacts.first)
     return np.einsum("ij,ij->i", contacts.branch, contacts.branch) <= reach**2, pairs
+
+
+def _rounding(places: Array) -> float:
+    """By how much the coordinates of `places` (m, 3) may be rounded, in m, when all have six digits; else 0."""
+    sizes = np.abs(places[places != 0.0])
+    if not len(sizes):
+        return 0.0
+    digits = sizes / 10.0 ** (np.floor(np.log10(sizes)) - _DIGITS + 1)
+    six = np.abs(digits - np.round(digits)) < 1e-4
+    return float(0.5 * 10.0 ** (np.floor(np.log10(sizes.max())) - _DIGITS + 1)) if six.all() else 0.0
 
 
 def rows_of(ids: Index, wanted: Index, step: int) -> Index:

@@ -164,7 +164,7 @@ class FieldAverages:
 
     def summary(self) -> list[str]:
         """What was computed and checked, in lines."""
-        lines = [*self.chosen.lines(self.diameters), *self.walls.mesh_notes()]
+        lines = [*self.chosen.averaging_notes(), *self.chosen.lines(self.diameters), *self.walls.mesh_notes()]
         if self.left_over:
             lines.append(f"note: the last {self.left_over} frames do not fill a group and were left out")
         size = " × ".join(f"{1e3 * one:.4g}" for one in self.grid.spacing)

@@ -15,6 +15,7 @@ from dembark.common.errors import DembarkError
 from .. import ContactFrame, GrainFrame
 from ..fields.coarse_graining import WallContacts, rows_of
 from ..spheres import volume
+from ..walls.contacts import into_box
 
 Array = NDArray[np.float64]
 
@@ -89,6 +90,6 @@ def grain_pressure(frame: GrainFrame, contacts: ContactFrame, walls: Sequence[Wa
     moment = -np.sum(contacts.forces * contacts.branch, axis=1)[:, None] * share
     total = sum(np.bincount(index[:, side], moment[:, side], len(frame.ids)) for side in (0, 1))
     for wall in walls:
-        _, row = cKDTree(frame.positions).query(wall.positions)
+        _, row = cKDTree(into_box(frame)).query(wall.positions)
         total = total - np.bincount(row, np.sum(wall.forces * (wall.points - wall.positions), axis=1), len(frame.ids))
     return np.asarray(total / (3.0 * volume(frame.radii)))

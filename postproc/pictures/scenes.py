@@ -94,7 +94,8 @@ class Album:
         own, notes = self.source.walls([name for name, wall in record.items() if wall["kind"] != "box"])
         self.notes += notes
         steps = self.source.grains.steps[list(self.numbers)]
-        self.fixed: list[Wall] = [*own, *self.walls] if self.look.walls else []
+        # All walls press on grains, drawn or not.
+        self.known: list[Wall] = [*own, *self.walls]
         meshes = self._meshes(steps) if self.look.walls and self.folder else []
         bodies = water.boxes(self.folder, record, steps) if self.folder else {}
         self.moving = [Surface(np.zeros((0, 3, 3)), opacity=_WALL, edges=True)] * len(meshes) + [
@@ -150,7 +151,7 @@ class Album:
             corners = _joined(corners, _SPACE.extent(places, reach))
             flat = _joined(flat, self.view.extent(places, reach))
             if self.name:
-                sample = self._quantity(frame, contacts)
+                sample = self._quantity(frame, contacts, self._time(frame.step, number))
                 values = sample.values[np.isfinite(sample.values)]
                 ends += [np.percentile(values, [2.0, 98.0])] if len(values) else []
                 kinds |= set(np.unique(values).astype(int).tolist()) if sample.kinds else set()
@@ -159,7 +160,7 @@ class Album:
             flat = _joined(flat, self.view.extent(place))
         # Walls reach to where others are.
         for number in self.numbers:
-            for wall in self._standing(self._time(self.source.grains.steps[number], number)):
+            for wall in self._standing(self._time(self.source.grains.steps[number], number)) if self.look.walls else ():
                 if isinstance(wall, PlaneWall) and np.isfinite(corners).all():
                     foot = wall.places(corners.mean(axis=0)[None]).points
                     corners = _joined(corners, np.concatenate([foot, foot]))
@@ -193,9 +194,10 @@ class Album:
         label = first.label if unit in ("", "1") else f"{first.label} / {f'({unit})' if set(unit) & set('/*^ ') else unit}"
         return Colours(label, low, high if high > low else low + 1.0, name=look.colours)
 
-    def _quantity(self, frame: GrainFrame, contacts: ContactFrame | None) -> Quantity:
-        """What the grains are coloured by; NaN of glued ones."""
-        walls = [wall_contacts(frame, wall) for wall in self.fixed if wall.name in frame.wall_forces] if self.name == "pressure" else []
+    def _quantity(self, frame: GrainFrame, contacts: ContactFrame | None, time: float) -> Quantity:
+        """What the grains are coloured by at `time` (s); NaN of glued ones."""
+        pressing = self._standing(time) if self.name == "pressure" else []
+        walls = [wall_contacts(frame, wall) for wall in pressing if wall.name in frame.wall_forces]
         found = quantity(self.name, frame, contacts, walls)
         if found.kinds or not self._cased(frame):
             return found
@@ -217,8 +219,8 @@ class Album:
         """The frame that is `row` among the chosen ones."""
         shown = self._shown(frame) & (frame.wrapped @ self.view.axes[2] <= self.middle)
         scale = self.sheet.colours
-        values = self._quantity(frame, contacts).values / self.factor if scale else None
         time = self._time(frame.step, self.numbers[row])
+        values = self._quantity(frame, contacts, time).values / self.factor if scale else None
         surfaces = [*(replace(look, triangles=place[row]) for look, place in zip(self.moving, self.places, strict=True)),
                     *self._walls(time)]
         plain = np.tile(np.asarray(_rgb(_WATER), np.uint8), (len(frame.ids), 1))
@@ -235,10 +237,12 @@ class Album:
 
     def _standing(self, time: float) -> list[Wall]:
         """Planes, cylinders and meshes that are no files of the run, where they are at `time` (s)."""
-        return [wall if np.isnan(time) else wall.at(time) for wall in self.fixed]
+        return [wall if np.isnan(time) else wall.at(time) for wall in self.known]
 
     def _walls(self, time: float) -> list[Surface]:
         """Planes, cylinders and meshes at `time` (s), as far as what is shown reaches."""
+        if not self.look.walls:
+            return []
         ends = np.array([[self.corners[a, 0], self.corners[b, 1], self.corners[c, 2]] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
         found = []
         for here in self._standing(time):

@@ -224,6 +224,26 @@ def test_no_grains_and_no_contacts():
         _ = fields.pressure
 
 
+@pytest.mark.parametrize(("digits", "expected"), [(6, 1.0), (10, 1.0)])
+def test_contacts_touch_in_dumps_of_six_digits_too(digits, expected):
+    """Pairs that overlap by less than the places are rounded by; those with a wider gap are bridges."""
+    rng, radius, overlap = np.random.default_rng(4), 0.5e-3, 1e-7
+    first = rng.uniform(0.1, 0.9, (400, 3))
+    away = rng.normal(size=(400, 3))
+    away /= np.linalg.norm(away, axis=1)[:, None]
+
+    def coordination(gap):
+        places = np.concatenate([first, first + (2.0 * radius + gap) * away])
+        rounded = np.array([[float(f"{one:.{digits}g}") for one in row] for row in places])
+        frame = grain_frame(rounded, radii=radius)
+        contacts = contact_frame(frame, np.column_stack([np.arange(400), np.arange(400, 800)]), np.ones((400, 3)))
+        fields = coarse_grain(frame, contacts, Grid((0, 0, 0), (1, 1, 1), (1, 1, 1)), width=0.3).fields()
+        return float(fields.coordination.squeeze())
+
+    assert coordination(-overlap) == pytest.approx(expected)
+    assert coordination(5e-6) == 0.0
+
+
 def test_a_grid_away_from_the_grains_holds_nothing():
     fields = coarse_grain(*random_frame(1), Grid((50, 50, 50), (51, 51, 51), (2, 2, 2)), width=0.1).fields()
     assert (fields.density == 0.0).all() and (fields.contact_stress == 0.0).all()

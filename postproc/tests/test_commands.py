@@ -103,6 +103,31 @@ def test_fields_of_dumps_with_options(run, capsys):
         assert "stress" not in found and "kinetic_stress" in found
 
 
+def test_means_over_uneven_frames_and_over_a_sheared_box_are_no_surprise(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    place, floor, *_ = packing()
+
+    def said(steps, command, shear=0.0):
+        text = ""
+        for step in steps:
+            tilt = 1e-5 * shear * step
+            bounds = f"xy xz yz pp pp ff\n0 {0.04 + tilt} {tilt}\n0 0.04 0\n0 0.06 0\n"
+            head, _, rest = grains_text(step, place, np.full(64, RADIUS), walls={"base": floor}).partition("ITEM: ATOMS")
+            text += f"{head.partition('ITEM: BOX')[0]}ITEM: BOX BOUNDS {bounds}ITEM: ATOMS{rest}"
+        (tmp_path / "a.dump").write_text(text)
+        code = main(["fields" if command else "walls", "a.dump", "--time-step", "1e-4", *(command or ["--wall", "base:plane"])])
+        out, error = capsys.readouterr()
+        assert code == 0, error
+        return out
+
+    grid = ["--grid", "1,1,1", "--width", "2d", "--out", "a.nc"]
+    for command in (grid, []):
+        assert "apart" not in said((0, 100, 200), command)
+        assert "note: frames lie 10 to 100 steps apart; means are over frames, not over time" in said((0, 100, 110), command)
+    assert "changes its shape" not in said((0, 100), grid)
+    assert "note: the periodic box changes its shape" in said((0, 100), grid, shear=1.0)
+
+
 def test_averages_by_cell_mask_thin_cells(run, capsys):
     words = ["fields", "run", "--cells", "--out", "f.nc", "--box", "0,0.04,0,0.04,-1mm,59mm", "--grid", "2,2,3"]
     assert main([*words, "--least-contacts", "32"]) == 0

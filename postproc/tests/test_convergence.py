@@ -41,6 +41,15 @@ def test_a_change_within_its_interval_gives_a_bound_and_no_order() -> None:
     assert found.uncertainty == pytest.approx(SAFETY_UNSEEN_ORDER * (0.01 + math.hypot(0.05, 0.05)))
 
 
+@given(coarse=st.floats(1.1, 3.0), fine=st.floats(-2.0, 2.0))
+def test_equal_values_do_not_show_that_the_error_is_nothing(coarse: float, fine: float) -> None:
+    """Of a parabola with two equal values at 1 and 2: f(h) = fine + c (h - 1)(h - 2), whose limit is fine + 2 c."""
+    found = convergence([1.0, 2.0, 4.0], [fine, fine, fine + 6.0 * (coarse - 1.0)])
+    assert found.kind == "scatter" and found.uncertainty is not None
+    assert found.uncertainty == pytest.approx(SAFETY_UNSEEN_ORDER * 6.0 * (coarse - 1.0)) and found.uncertainty > 2.0 * (coarse - 1.0)
+    assert convergence([1.0, 2.0, 4.0], [fine] * 3).uncertainty == 0.0
+
+
 def test_oscillation_and_divergence_are_named() -> None:
     assert convergence([1.0, 2.0, 4.0], [1.0, 1.2, 0.9]).kind == "oscillating"
     away = convergence([1.0, 2.0, 4.0], [1.0, 2.0, 2.1])

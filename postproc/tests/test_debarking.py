@@ -268,6 +268,34 @@ def test_command_reads_the_loads_of_a_run(runs: Path, capsys: pytest.CaptureFixt
     assert sorted(path.name for path in (runs / "p").iterdir()) == ["degree.png", "doses.png", "forces.png"]
 
 
+@pytest.mark.parametrize("loads", [1, 3])
+def test_no_damaging_impact_bounds_their_rate_and_is_no_certain_nothing(loads: int) -> None:
+    """In trials at a low rate, nineteen of twenty intervals hold it."""
+    from dembark.postproc.debarking.report import pooled_values
+
+    rng, rate, held = np.random.default_rng(5), 0.03, 0
+    for _ in range(40):
+        found = []
+        for _ in range(loads):
+            damaging = records(int(rng.poisson(4 * 3 * rate)), int(rng.integers(1 << 30)), peak_force=6000.0)
+            found.append(outcome(load(np.concatenate([records(50, int(rng.integers(1 << 30))), damaging])), RANGE))
+        value = pooled_values(found)["damaging_impacts"]
+        held += abs(value.value - rate) <= value.half
+    assert held >= 36
+    none = outcome(load(records(50)), RANGE).values
+    # Four revolutions of three logs without an event: at most 3.69, with 97.5 % confidence.
+    assert none["damaging_impacts"].interval[1] == pytest.approx(3.6889 / 12.0, rel=1e-4)
+    assert none["damaging_share"].half == pytest.approx(1.0 - 0.025 ** (1.0 / 50.0)) and none["wood_loss_index"].half == math.inf
+
+
+def test_a_window_beyond_the_run_is_refused(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["debark", "out", "--speed", "30 rpm", "--bark-force", "1 kN", "--wood-force", "5 kN", "--begin", "2", "--end"]
+    assert main([*words, "10"]) == 0
+    capsys.readouterr()
+    assert main([*words, "60"]) == 2
+    assert "ends at 60 s, its run at 10 s" in capsys.readouterr().err
+
+
 def test_command_reads_a_file_of_the_users_own(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (runs / "mine.txt").write_bytes((runs / "out/replica-1/impacts.txt").read_bytes())
     words = ["debark", "mine.txt", "--grains", "out/replica-1/grains.dump", "--wood-force", "5 kN",

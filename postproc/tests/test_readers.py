@@ -130,6 +130,13 @@ def test_forces_that_seem_to_be_those_on_the_other_grain_are_reported(tmp_path):
 
     push = -rng.uniform(1.0, 2.0, (count, 1)) * branch + 0.1 * np.cross(branch, (1.0, 0.0, 0.0))  # with friction
     assert read(push) == ()
+    # A filling begins with few contacts.
+    text = contacts_text(4, first[:1], second[:1], ids[:1], -push[:1], **box) + contacts_text(5, first, second, ids, -push, **box)
+    path.write_text(text)
+    dump = ContactsDump(path)
+    assert len(dump[0].ids) == 1 and dump.remarks == ()
+    with pytest.warns(DumpWarning, match="from step 5 on: nearly all forces point"):
+        assert len(dump[1].ids) == count
     with pytest.warns(DumpWarning, match="nearly all forces point from grain 1 to grain 2: if they are those on grain 2"):
         assert read(-push)
     # Grains that bridges pull together push as much; two may hang on one.

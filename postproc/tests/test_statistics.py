@@ -97,7 +97,9 @@ def test_pooling_below_three_replicas_keeps_their_own_intervals():
     assert over_replicas([Estimate(1.0, 0.3)]).half == 0.3
     assert over_replicas([Estimate(1.25, 0.3), Estimate(1.75, 0.4)]) == Estimate(1.5, 0.25, "within 2 replicas: ")
     assert over_replicas([Estimate(1.0, 0.3), Estimate(2.0, 0.4)]).half == 0.5  # they differ by more than either varies
-    assert over_replicas([Estimate(1.0, 9.0)] * 3).half == 0.0
+    assert over_replicas([Estimate(1.0, 9.0)] * 3).half == pytest.approx(9.0 / math.sqrt(3.0))  # equal values show no spread
+    assert over_replicas([Estimate(1.0, 9.0), Estimate(1.0, 9.0), Estimate(1.0, 0.0), Estimate(1.3, 0.0)]).half < 0.3
+    assert over_replicas([Estimate(1.0, math.inf)] * 3).half == over_replicas([Estimate(1.0, 0.0)] * 3).half == 0.0
 
 
 def test_joint_interval_adds_in_quadrature():

@@ -8,7 +8,7 @@ import pytest
 from dumps import grains_text
 from MDAnalysis import transformations
 
-from dembark.postproc import DumpError, GrainsDump, universe
+from dembark.postproc import DumpError, DumpWarning, GrainsDump, universe
 
 BOX = ((0.0, 1.0), (-1.0, 1.0), (0.0, 3.0))
 PLACES = np.array([[0.1, -0.2, 0.5], [0.5, 0.5, 1.5], [0.9, 0.9, 2.5]])
@@ -32,12 +32,29 @@ def drift(tmp_path):
 def test_registered_format_needs_no_more_than_its_name(drift):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", ".*the box is not periodic", DumpWarning)
         world = MDAnalysis.Universe(str(drift), format="DEMGRAINS", time_step=1e-3)
         assert len(world.trajectory) == 5
         assert (world.trajectory[3].time, world.trajectory.dt) == (pytest.approx(0.3), pytest.approx(0.1))
     np.testing.assert_allclose(world.atoms.masses, GrainsDump(drift)[0].masses)
     np.testing.assert_allclose(world.dimensions, [1.0, 2.0, 3.0, 90.0, 90.0, 90.0])
     np.testing.assert_allclose(world.copy().trajectory[4].positions, PLACES + np.array([1.2, 0.0, 0.0]), atol=1e-6)
+
+
+def test_mdanalysis_finds_no_neighbours_across_walls_without_a_word(tmp_path):
+    """It takes every axis of a box for periodic."""
+    path = tmp_path / "grains.dump"
+    places, box = np.array([[0.02, 0.5, 0.5], [0.98, 0.5, 0.5], [0.5, 0.5, 0.5]]), ((0.0, 1.0),) * 3
+
+    def neighbours(flags):
+        path.write_text(grains_text(0, places, [0.02] * 3, box=box, flags=flags))
+        return universe(path).select_atoms("around 0.05 id 1").ids.tolist()
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DumpWarning)
+        assert (neighbours("pp pp pp"), neighbours("ff ff ff"), neighbours("ss mm ff")) == ([2], [], [])
+    with pytest.warns(DumpWarning, match="the box is not periodic along x and z, but MDAnalysis takes it for periodic there"):
+        neighbours("ff pp ss")
 
 
 def test_the_same_positions_as_mdanalysis_reads(drift):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -257,6 +259,25 @@ def test_force_on_an_inclusion_by_height_and_its_sign():
     found = wall_stress([frame], body, inclusion_patches(body, 0.5, 1, np.array([-1.0, 0.0, 1.0])), contacts=[contacts])
     np.testing.assert_allclose(found.mean[1] * np.pi, [4.0, -1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(found.force, [[4.0, 0.0, -3.0]])
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.4, 2.5])
+def test_an_inclusion_across_a_periodic_face_is_one_body(shift):
+    """Two glued grains that others push from both sides, in a dump without image flags."""
+    places = np.array([[1.0, 0.0, 0.5], [2.0, 0.0, 0.5], [0.0, 0.0, 0.5], [3.0, 0.0, 0.5]]) + np.array([shift, 0.0, 0.0])
+    places[:, 0] %= 4.0
+    frame = replace(frame_of(places, 0.5, ids=[1, 2, 3, 4]), low=np.array([0.0, -1.0, 0.0]), high=np.array([4.0, 1.0, 1.0]),
+                    periodic=np.array([True, False, False]), unwrapped=False)
+    contacts = contacts_of(frame, [1, 2], [3, 4], np.array([[2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]]))
+    contacts = replace(contacts, branch=np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    body = Inclusion("body", (1, 2))
+    assert body.size(frame) == pytest.approx(1.0)
+    points, forces = body.loads(frame, contacts)
+    np.testing.assert_allclose(points.points, [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], atol=1e-12)
+    assert (np.sum(forces * points.points, axis=1) > 0.0).all()
+    # A body as long as the period stays as it is.
+    row = replace(frame, positions=np.array([[0.5, 0.0, 0.5], [1.5, 0.0, 0.5], [2.5, 0.0, 0.5], [3.5, 0.0, 0.5]]))
+    np.testing.assert_allclose(Inclusion("row", (1, 2, 3, 4)).members(row)[1][:, 0], [-1.5, -0.5, 0.5, 1.5])
 
 
 def test_inclusion_without_its_contacts_or_grains_is_refused():

@@ -11,6 +11,7 @@ from dembark.common.errors import DembarkError
 
 from ..contacts import ContactFrame
 from ..dumps import DumpError
+from ..dumps.frames import less_edges
 from ..fields.coarse_graining import rows_of
 from ..grains import GrainFrame
 from .surfaces import CylinderWall, Places
@@ -54,14 +55,21 @@ class Inclusion:
         return float(np.max(np.linalg.norm(relative, axis=1) + members.radii))
 
     def members(self, frame: GrainFrame) -> tuple[GrainFrame, Array]:
-        """The group's grains and their places (m, 3) about its centre of mass; DumpError when one is not there."""
+        """The group's grains and their places (m, 3) about its centre of mass; DumpError when one is not there.
+
+        Without image flags in the dump, a group shorter than half a period is put together across periodic faces.
+        """
         wanted = np.unique(np.asarray(self.ids, np.int64))
         found = np.isin(frame.ids, wanted)
         if found.sum() != len(wanted):
             lost = np.setdiff1d(wanted, frame.ids)
             raise DumpError(f"inclusion {self.name}: grain {lost[0]} is not in the frame of step {frame.step}")
         members = frame.select(found)
-        return members, members.positions - np.average(members.positions, axis=0, weights=members.masses)
+        places = members.positions
+        if not frame.unwrapped and frame.periodic.any():
+            near = places[0] + less_edges(places - places[0], frame)
+            places = np.where(np.ptp(near, axis=0) < 0.5 * (frame.high - frame.low), near, places)
+        return members, places - np.average(places, axis=0, weights=members.masses)
 
     def loads(self, frame: GrainFrame, contacts: ContactFrame) -> tuple[Places, Array]:
         """Places of its k contacts with other grains, relative to its centre, and the forces (k, 3) of the inclusion on those, N.

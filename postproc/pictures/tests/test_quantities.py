@@ -1,13 +1,17 @@
 """What grains are coloured by: what the dump holds, and what their contacts give them."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from dumps import contacts_text, grains_text
 
 from dembark.common.errors import DembarkError
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.pictures.quantities import grain_pressure, quantity, usual
+from dembark.postproc.pictures.scenes import Album, Look
+from dembark.postproc.sources import open_source
 from dembark.validation.verification import scenes
 
 
@@ -21,6 +25,16 @@ def test_pressure_in_a_grain_between_two_others():
     np.testing.assert_allclose(grain_pressure(frame, links), [0.5 * middle, middle, 0.5 * middle])
     wall = WallContacts(np.array([[-0.5, 0.0, 0.0]]), place[:1], np.array([[6.0, 0.0, 0.0]]))
     np.testing.assert_allclose(grain_pressure(frame, links, [wall]), [middle, middle, 0.5 * middle])
+
+
+def test_the_force_of_a_wall_belongs_to_the_grain_it_touches_in_a_periodic_box():
+    """The third grain lies where the first one does that has gone around once."""
+    places = np.array([[0.5, 0.5, 0.5], [2.5, 0.5, 0.5], [4.5, 0.5, 0.5]])
+    frame = scenes.grains(places, np.full(3, 0.5), low=np.zeros(3), high=np.array([4.0, 4.0, 4.0]))
+    frame = replace(frame, periodic=np.array([True, False, False]), wrapped=np.array([[1.5, 0.5, 0.5], [2.5, 0.5, 0.5], [0.5, 0.5, 0.5]]))
+    wall = WallContacts(np.array([[0.5, 0.5, 0.0]]), frame.wrapped[2:], np.array([[0.0, 0.0, 6.0]]))
+    none = scenes.contacts(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2), int))
+    np.testing.assert_allclose(grain_pressure(frame, none, [wall]), [0.0, 0.0, 3.0 / (3.0 * np.pi / 6.0)])
 
 
 @pytest.fixture
@@ -60,3 +74,18 @@ def test_other_names_are_refused_with_what_is_right(frame, name, words):
 
 def test_speed_is_usual_and_size_where_there_is_none(frame):
     assert usual(frame) == "velocity" and usual(replace(frame, velocities=None)) == "diameter"
+
+
+@pytest.mark.parametrize("drawn", [True, False])
+def test_a_wall_presses_where_it_is_then_drawn_or_not(tmp_path, drawn):
+    """A lid that has come down by half of its height presses with 3 N on a grain of 5 mm: 3 F R / 4 pi R^3 / 3."""
+    box = ((0.0, 0.1),) * 3
+    places, push = np.array([[0.03, 0.05, 0.045], [0.06, 0.05, 0.02]]), np.array([[0.0, 0.0, -3.0], [0.0, 0.0, 0.0]])
+    (tmp_path / "grains.dump").write_text(grains_text(100, places, np.full(2, 0.005), walls={"lid": push}, box=box))
+    (tmp_path / "contacts.dump").write_text(contacts_text(100, [], [], [], [], box=box))
+    lid = {"kind": "plane", "origin": [0, 0, 0.1], "normal": [0, 0, -1], "velocity": [0, 0, -1.0]}
+    (tmp_path / "run.json").write_text(json.dumps({"case": "x", "time_step": 5e-4, "walls": {"lid": lid}}))
+    album = Album(open_source(tmp_path), [0], Look(colour_by="pressure", walls=drawn))
+    exact = 3.0 * 0.005 / (4.0 * np.pi * 0.005**3)
+    assert album.sheet.colours.high * album.factor == pytest.approx(np.percentile([0.0, exact], 98.0))
+    assert len(album._walls(0.05)) == drawn
