@@ -158,8 +158,7 @@ def measure(replicas: Replicas) -> Measurement:
     codes = published()
     levels = [codes[code] for code in LEVELS]
     values["rate"] = Value(rate, _spread([code.rate().value for code in codes.values()]))
-    values["late_over_early"] = Value(uneven, exact(0.965), detail="codes: " + ", ".join(
-        f"{code.late_over_early().value:.3f}" for code in codes.values()))
+    values["late_over_early"] = Value(uneven, _spread([code.late_over_early().value for code in codes.values()]))
     values["last_percent"] = Value(last, _spread([code.when(0.01 * code.left[0]) for code in levels]))
     for second in (1, 2, 3):
         # The number left is known as well as the number that has gone.

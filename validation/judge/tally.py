@@ -23,7 +23,7 @@ Item = TypeVar("Item")
 
 VERIFICATION = "verification.json"
 # What each kind of evidence means, for people; "" is that of cases that do not say.
-MEANING = {"experiment": "measured values", "theory": "laws and exact solutions", "code": "another code or engine",
+MEANING = {"experiment": "measurements, formulas fitted to them", "theory": "laws and exact solutions", "code": "another code or engine",
            "identity": "conservation laws, the scheme against itself", "": "not stated"}
 
 

@@ -87,7 +87,7 @@ def test_status_counts_checks_by_kind_of_evidence(results: Path, capsys: pytest.
     assert main(["status", str(results)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[lines.index("1 series measured; 1 of 2 checks passed, 1 FAILED") + 1 :][:2] == [
-        "  experiment (measured values): 0 of 1 check passed, 1 FAILED",
+        "  experiment (measurements, formulas fitted to them): 0 of 1 check passed, 1 FAILED",
         "  identity (conservation laws, the scheme against itself): 1 of 1 check passed, none failed"]
 
 
