@@ -20,6 +20,7 @@ enum Member {
   mean_mode,
   mean_file,
   mesh_precision,
+  gravity_source,
   variable_count,
   variable_names,
   variable_texts
@@ -44,6 +45,7 @@ auto pointer(Tag<variable_count>);
 auto pointer(Tag<variable_names>);
 auto pointer(Tag<variable_texts>);
 auto pointer(Tag<mesh_precision>);
+auto pointer(Tag<gravity_source>);
 template struct Reach<keyword_map, &Settings::settings>;
 template struct Reach<fix_map, &Modify::fix_map>;
 template struct Reach<command_map, &Input::command_map>;
@@ -58,6 +60,7 @@ template struct Reach<variable_count, &Variable::nvar>;
 template struct Reach<variable_names, &Variable::names>;
 template struct Reach<variable_texts, &Variable::data>;
 template struct Reach<mesh_precision, &MultiNodeMesh<3>::precision_>;
+template struct Reach<gravity_source, &FixGravity::varflag>;
 
 template <Member name, class Type, class Owner>
 Type& reach(Owner& owner) {
@@ -93,6 +96,7 @@ std::vector<std::pair<std::string, std::string>> formulas(Variable& variables) {
       all.emplace_back(reach<variable_names, char**>(variables)[k], reach<variable_texts, char***>(variables)[k][0]);
   return all;
 }
+bool from_variables(FixGravity& gravity) { return reach<gravity_source, int>(gravity) != 0; }
 double precision(TriMesh& mesh) { return reach<mesh_precision, double>(static_cast<MultiNodeMesh<3>&>(mesh)); }
 
 }  // namespace dembark_liggghts

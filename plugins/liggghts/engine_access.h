@@ -12,6 +12,7 @@
 
 #include "fix_ave_time.h"
 #include "fix_contact_history.h"
+#include "fix_gravity.h"
 #include "granular_pair_style.h"
 #include "granular_wall.h"
 #include "input.h"
@@ -53,6 +54,8 @@ bool has_file(LAMMPS_NS::FixAveTime& mean);
 std::vector<std::pair<std::string, std::string>> formulas(LAMMPS_NS::Variable& variables);
 /// m, of a mesh: its keyword `precision`, which only the mesh itself can read.
 double precision(LAMMPS_NS::TriMesh& mesh);
+/// Whether a gravity comes from variables: the fix itself alone can say, and it computes them after the forces of the pairs.
+bool from_variables(LAMMPS_NS::FixGravity& gravity);
 
 }  // namespace dembark_liggghts
 

@@ -117,6 +117,11 @@ void FixSphBody::init() {
   MPI_Allreduce(&count, &all, 1, MPI_DOUBLE, MPI_SUM, world);
   if (all == 0.0) fail("its group has no atoms: a body is made of particles");
   place_particles();
+  for (const Fix *const fix : fixes())
+    if (is(*fix, "move") && meets(*fix))
+      fail(std::string("fix ") + fix->id + " (move) moves its particles; " +
+           (state_.body.free ? "a body moves by its forces, a wall by velocity and spin of fix sph/wall"
+                             : "give this fix the motion by velocity, spin and centre"));
   // Then a wall must be put back in each step.
   moved_by_others_ = false;
   for (const Fix *const fix : fixes())
@@ -224,8 +229,16 @@ void FixSphBody::restart(char *buffer) {
     part.read(&state_);
     part.end();
   });
-  // Properties are those of the script; only the motion goes on.
+  // Properties are those of the script, and the motion of a wall is one; place and turn go on, and the motion of what is free.
   state_.body.mass = given.mass;
   state_.body.inertia = given.inertia;
+  if (!given.free) {
+    if (norm(given.spin) > 0.0 && norm(state_.body.spin) == 0.0)
+      fail(
+          "it turns, and did not when the restart file was written, which has no centre for it; give the fix another ID, with which it "
+          "begins anew");
+    state_.body.velocity = given.velocity;
+    state_.body.spin = given.spin;
+  }
   restarted_ = true;
 }

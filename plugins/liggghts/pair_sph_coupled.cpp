@@ -20,6 +20,7 @@
 #include "update.h"
 
 #include "fix_nve_sph_coupled.h"
+#include "engine_access.h"
 #include "fix_sph_body.h"
 #include "dembark/keyword_reader.hpp"
 #include "dembark/sph/best_loops.hpp"
@@ -136,6 +137,9 @@ void PairSphCoupled::find_gravity() {
     if (fix) found = fix;
   }
   if (found) {
+    if (dembark_liggghts::from_variables(*found))
+      refuse(std::string("the gravity of fix ") + found->id +
+             " comes from a variable, and the fluid takes a constant one; give numbers, such as ${g} for v_g");
     double g[3];
     found->get_gravity(g);
     gravity = vector(g);
@@ -148,7 +152,7 @@ void PairSphCoupled::find_gravity() {
 }
 
 void PairSphCoupled::begin(bool first) {
-  const Settings &s = scene_.settings;
+  const auto &s = scene_.settings;
   if (const std::string wrong = s.step_error(update->dt); !wrong.empty()) refuse(wrong);
   find_gravity();
   sort_particles();
@@ -182,7 +186,7 @@ std::string PairSphCoupled::wrong_atom() const {
 
 std::string PairSphCoupled::wrong_with(int i) const {
   using dembark::keywords::text;
-  const Settings &s = scene_.settings;
+  const auto &s = scene_.settings;
   const double due = s.mass();
   const bool fluid = particle_[i].role == SphRole::fluid;
   int groups = fluid;

@@ -77,6 +77,47 @@ def test_a_wall_that_moves_does_work(tmp_path: Path) -> None:
     assert energies[8] == pytest.approx(fluid.energies().work, rel=1e-8) and abs(energies[8]) > 1e-3
 
 
+def pushed(folder: Path, wall: str, ranks: int = 1, goes_on: bool = False, name: str = "wall") -> Run:
+    """Twenty steps with the wall `sph/wall` of these words, from the restart file of the run before in this folder if it goes on."""
+    scene = Scene(SCENES["dam"].points, SCENES["dam"].wall, 0.02, 30.0)
+    shown = "variable x equal xcm(g2,x)\nvariable v equal vcm(g2,x)\nvariable p equal f_wall[1]\nvariable w equal f_wall[9]\n"
+    text = deck(scene, 20, ranks=ranks, extra=shown, changes=(("fix wall g2 sph/wall", f"fix wall g2 sph/wall {wall}"),))
+    if goes_on:
+        text = resumed(text, 2).replace("resume_state state", "read_restart wall.restart")
+    text = text.replace("fix wall ", f"fix {name} ").replace("f_wall", f"f_{name}")
+    end = "" if goes_on else "write_restart wall.restart\n"
+    return run_deck(folder, f'{text}print "wall $x $v $p $w"\n{end}', ranks=ranks)
+
+
+def wall_numbers(done: Run) -> list[float]:
+    """x and its velocity of the wall's particles, x of the wall and its spin about z."""
+    assert done.code == 0, done.error or done.output[-1500:]
+    return [float(word) for word in next(line for line in done.output.splitlines() if line.startswith("wall ")).split()[1:]]
+
+
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.full)])
+def test_a_wall_moves_as_the_script_says_after_a_restart_too(ranks: int, tmp_path: Path) -> None:
+    """Its place goes on; from the file it would have the velocity of the run before."""
+    step = 20 * SCENES["dam"].step
+    before = wall_numbers(pushed(tmp_path, "velocity 0.1 0 0", ranks))
+    assert before[1] == pytest.approx(0.1) and before[2] == pytest.approx(0.1 * step)
+    for speed in (-0.3, 0.0):
+        after = wall_numbers(pushed(tmp_path, f"velocity {speed} 0 0", ranks, goes_on=True))
+        assert after[1] == pytest.approx(speed, abs=1e-12) and after[2] - before[2] == pytest.approx(speed * step, abs=1e-7)
+        assert after[0] - before[0] == pytest.approx(speed * step, abs=1e-6)
+
+
+def test_a_wall_that_begins_to_turn_after_a_restart_needs_its_centre(tmp_path: Path) -> None:
+    words = "centre 0.24 0.15 0 spin 0 0 "
+    pushed(tmp_path / "turns", f"{words}0.5")
+    assert wall_numbers(pushed(tmp_path / "turns", f"{words}0.2", goes_on=True))[3] == 0.2
+    pushed(tmp_path / "rests", "")
+    refused = pushed(tmp_path / "rests", f"{words}0.2", goes_on=True)
+    assert refused.code != 0 and "it turns, and did not when the restart file was written" in refused.error, refused.output[-800:]
+    anew = wall_numbers(pushed(tmp_path / "rests", f"{words}0.2", goes_on=True, name="turned"))
+    assert anew[2:] == [0.24, 0.2]
+
+
 @pytest.mark.parametrize(("style", "ranks", "scene"), [("hybrid granular sph", 1, dam(shifting=2.0)), ("sph", 2, dam(shifting=2.0)),
                                                        ("hybrid granular sph", 1, box(xsph=0.5, shepard=7)),
                                                        ("sph", 2, dam(moment="particles"))])
@@ -127,6 +168,14 @@ REFUSED = {
     "units": ("units si", "units metal", "in units metal force is not mass times acceleration"),
     "no pair": ("fix weight", "unfix fluid\npair_style none\natom_modify sort 0 0.0\nfix weight", "it needs pair_style sph/coupled"),
     "weight": ("fix weight all", "fix weight g2", "the group of fix gravity must hold the whole fluid"),
+    "changing gravity": ("fix weight all gravity 9.81 vector 0 -1 0", "variable g equal 9.81\nfix weight all gravity v_g vector 0 -1 0",
+                         "the gravity of fix weight comes from a variable, and the fluid takes a constant one"),
+    "changing direction": ("fix weight all gravity 9.81 vector 0 -1 0",
+                           "variable g equal -1-time\nfix weight all gravity 9.81 vector 0 v_g 0\nrun 0", "comes from a variable"),
+    "moved wall": ("fix weight", "fix paddle g2 move linear 0.1 0 NULL\nfix weight",
+                   "fix paddle (move) moves its particles; give this fix the motion by velocity, spin and centre"),
+    "moved wall, first": ("fix wall g2", "fix paddle g2 move linear 0.1 0 NULL\nfix wall g2", "fix paddle (move) moves its particles"),
+    "moved body": ("fix weight", "fix paddle all move linear 0.1 0 NULL\nfix weight", "fix paddle (move) moves its particles"),
 }
 
 
