@@ -1,6 +1,7 @@
 #include "engine_access.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace dembark_lammps {
 namespace {
@@ -20,6 +21,12 @@ struct VariableTexts {
   friend Member access(VariableTexts);
 };
 template struct Access<VariableTexts, &LAMMPS_NS::Variable::data>;
+
+struct RegionAxis {
+  typedef double (LAMMPS_NS::Region::*Member)[3];
+  friend Member access(RegionAxis);
+};
+template struct Access<RegionAxis, &LAMMPS_NS::Region::axis>;
 
 struct RestartedFixes {
   typedef char** LAMMPS_NS::Modify::* Member;
@@ -54,6 +61,11 @@ std::vector<std::pair<std::string, std::string>> formulas(LAMMPS_NS::Variable* v
     if (variables->equalstyle(k) || variables->atomstyle(k) || variables->vectorstyle(k))
       all.emplace_back(variables->names[k], (variables->*access(VariableTexts()))[k][0]);
   return all;
+}
+
+double axis_length(const LAMMPS_NS::Region* region) {
+  const auto& axis = region->*access(RegionAxis());
+  return std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
 }
 
 }  // namespace dembark_lammps

@@ -8,6 +8,7 @@
 
 #include "fix.h"
 #include "modify.h"
+#include "region.h"
 #include "variable.h"
 
 namespace dembark_lammps {
@@ -22,6 +23,9 @@ void begin_steps_first(LAMMPS_NS::Modify* modify, const LAMMPS_NS::Fix* fix);
 bool left_in_restart_file(const LAMMPS_NS::Modify* modify, const std::string& prefix);
 /// Names and formulas of variables of styles equal, atom and vector. Their texts are private.
 std::vector<std::pair<std::string, std::string>> formulas(LAMMPS_NS::Variable* variables);
+/// Length of the axis about which a region rotates, as the script gives it: LAMMPS turns the region about the unit vector, but its angular
+/// velocity is as many times too large. The axis is private.
+double axis_length(const LAMMPS_NS::Region* region);
 
 }  // namespace dembark_lammps
 

@@ -10,6 +10,7 @@
 #include "utils.h"
 
 #include "contact_call.h"
+#include "engine_access.h"
 #include "shared_stl.h"
 
 using namespace LAMMPS_NS;
@@ -34,6 +35,12 @@ void RegionSurface::find() {
 
 void RegionSurface::prepare(double, const dembark::PrescribedMotion* motion) {
   find();
+  const std::string style = region_->style;
+  if (region_->dynamic_check() && (style == "union" || style == "intersect"))
+    throw std::invalid_argument("region " + id_ + " (" + style +
+                                ") has moving parts, of whose velocity LAMMPS says nothing; take a fix wall/dembark for each part, " +
+                                "or 'motion' for all");
+  axis_length_ = region_->rotateflag ? axis_length(region_) : 1.0;
   if (region_->dynamic_check() && motion)
     throw std::invalid_argument("region " + id_ + " moves by itself; take 'move' and 'rotate' from it, or 'motion' from the fix");
 }
@@ -44,7 +51,7 @@ void RegionSurface::begin_step() {
   if (moves_) region_->set_velocity();
 }
 
-Vec3 RegionSurface::spin() const { return moves_ && region_->rotateflag ? vector(region_->omega) : Vec3{}; }
+Vec3 RegionSurface::spin() const { return moves_ && region_->rotateflag ? (1.0 / axis_length_) * vector(region_->omega) : Vec3{}; }
 
 Vec3 RegionSurface::origin() const { return region_->rotateflag ? vector(region_->rpoint) : Vec3{}; }
 
@@ -59,6 +66,8 @@ const std::vector<WallContact>& RegionSurface::contacts(const Vec3& centre, doub
       double velocity[3], place[3] = {centre.x, centre.y, centre.z};
       region_->velocity_contact(velocity, place, c);
       one.velocity = vector(velocity);
+      // With an axis of another length than 1.
+      if (region_->rotateflag) one.velocity += cross(spin() - vector(region_->omega), centre - one.separation - origin());
     }
     found_.push_back(one);
   }

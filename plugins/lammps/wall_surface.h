@@ -66,6 +66,7 @@ class RegionSurface : public WallSurface {
   const std::string id_;
   LAMMPS_NS::Region* region_ = nullptr;
   bool moves_ = false;
+  double axis_length_ = 1.0;  // of its rotation, as the script gives it
 
   void find();
 };

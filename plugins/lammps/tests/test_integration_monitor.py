@@ -56,6 +56,21 @@ def test_impacts_are_judged_as_in_liggghts(tmp_path: Path) -> None:
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-15)
 
 
+@pytest.mark.parametrize(("dimension", "motion"), [(3, "nve/sphere"), (2, "nve/sphere"), (2, "nve/sphere disc"), (3, "nve")])
+def test_impacts_are_those_of_discs_and_of_grains_that_do_not_turn(tmp_path: Path, dimension: int, motion: str) -> None:
+    """The reference of an oblique impact has the moments of inertia with which the engine turns the grains."""
+    text = line_of_grains(lammps_driver, [-RADIUS - 1e-5, RADIUS + 1e-5], [0.5, -0.5], replace(BED, restitution=0.9), 2e-6, f"""\
+set atom 1 vy 0.3
+fix motion all {motion}
+{MONITOR}speed 1 every 1 impacts 1 action report
+{THERMO}thermo 100
+run 1500""")
+    if dimension == 2:
+        text = text.replace("boundary f f f", "dimension 2\nboundary f f p")
+    found = figures(run_deck(tmp_path, text))[-1, 1:]
+    assert found[20] == 1 and found[21] < 5e-3
+
+
 def falling(words: str, run: str = "run 3000", *, ranks: int = 1, create: str = CREATE, state: str = STATE, step: str = "1e-5") -> str:
     text = bed(f"{MONITOR}{words}\n{THERMO}thermo 100\n{run}", material=BED, create=create, state=state,
                head="processors 2 1 1" if ranks == 2 and state else "")

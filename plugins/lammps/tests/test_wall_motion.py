@@ -1,4 +1,4 @@
-"""fix wall/dembark stl ... motion ...: walls are where they are prescribed to be, contacts see their velocity, forces balance."""
+"""fix wall/dembark ... motion ..., or on regions that move: walls are where they are to be, contacts see their velocity, forces balance."""
 
 import math
 from dataclasses import replace
@@ -200,6 +200,67 @@ def test_wrong_surfaces_are_told_in_one_line(tmp_path, old, new, line):
     done = run_deck(tmp_path, deck(tmp_path, "", "run 10").replace(old, new))
     assert done.code != 0
     assert "fix move wall/dembark" in done.error and line in done.error, done.error or done.output[-500:]
+
+
+ROUGH = replace(DRY, restitution=1.0)
+MOVING = """\
+variable angle equal 0.5*time
+variable shift equal 0.01*time
+variable wide equal 0.0505+0.01*time
+region floor plane 0 0 0 0 0 1 rotate v_angle 0.05 0 0 {axis} units box
+region bowl cylinder z 0.05 0 0.0505 -0.05 0.05 rotate v_angle 0.05 0 0 {axis} units box
+region lid plane 0 0 0.01 0 0 -1 move NULL NULL v_shift units box
+region tube cylinder z 0 0 v_wide -0.01 0.01 units box
+region still plane 0 0 -0.01 0 0 1 units box
+region both union 2 floor still units box
+region cut intersect 2 still lid units box
+region pulse union 2 tube still units box
+"""
+
+
+def on_regions(wall: str, axis: str = "0 0 1") -> str:
+    """A grain at rest in touch with a floor and, 0.05 m from their axis, with a cylinder around it."""
+    return f"""\
+{head()}
+region domain block -0.02 0.12 -0.07 0.07 -0.06 0.06 units box
+create_box 2 domain
+create_atoms 1 single 0.1 0 0.0009 units box
+set group all diameter 0.002 density 2500.0
+neighbor 0.002 bin
+pair_style dembark/granular {settings(ROUGH)}
+pair_coeff * * {coefficients(ROUGH)}
+{MOVING.format(axis=axis)}
+fix wall all wall/dembark {wall} type 2
+variable fx equal fx[1]
+variable fy equal fy[1]
+variable fz equal fz[1]
+thermo_style custom step v_fx v_fy v_fz
+timestep 1e-6
+thermo 1000
+run 20
+print "force $(v_fx:%.17g) $(v_fy:%.17g) $(v_fz:%.17g)"
+"""
+
+
+@pytest.mark.parametrize("region", ["floor", "bowl"])
+def test_the_length_of_the_axis_of_a_region_does_not_matter(tmp_path, region):
+    """The region turns about the direction of its axis, and its surface has the speed of that."""
+    forces = []
+    for k, axis in enumerate(("0 0 1", "0 0 3", "0 0 -0.25")):
+        done = run_deck(tmp_path / str(k), on_regions(f"region {region}", axis))
+        assert done.code == 0, done.error or done.output[-2000:]
+        forces.append(np.array(next(line for line in done.output.splitlines() if line.startswith("force ")).split()[1:], float))
+    assert forces[0][1] > 1e-4 * np.abs(forces[0]).max()
+    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(forces[2][1], -forces[0][1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("region", ["both", "cut", "pulse"])
+def test_regions_of_moving_parts_are_refused_in_one_line(tmp_path, region):
+    done = run_deck(tmp_path, on_regions(f"region {region}"))
+    style = "intersect" if region == "cut" else "union"
+    assert done.code != 0 and f"region {region} ({style}) has moving parts, of whose velocity LAMMPS says nothing" in done.error, done.error
+    assert len(done.error.strip().splitlines()) == 1
 
 
 def late_deck(then: str, *, create: str = "", motions: list[str] = late_motion.MOTIONS) -> str:
