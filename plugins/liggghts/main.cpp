@@ -31,6 +31,7 @@
 #include "fix_resume_exact.h"
 #include "fix_sph_body.h"
 #include "fix_sph_contact.h"
+#include "fix_wall_gran_forgetful.h"
 #include "fix_wall_motion.h"
 #include "granular_combinations.h"
 #include "pair_sph_coupled.h"
@@ -89,8 +90,9 @@ void enter_styles(LAMMPS_NS::LAMMPS& host) {
   deleted_atoms[&host].clear();
   dembark_liggghts::register_contact_models();
   auto& fixes = dembark_liggghts::fix_styles(*host.modify);
-  // In place of the stock style, of the same name.
+  // In place of the stock styles, of the same names.
   fixes.at("adapt") = &create_fix<LAMMPS_NS::FixAdaptAtOnce>;
+  fixes.at("wall/gran") = &create_fix<LAMMPS_NS::FixWallGranForgetful>;
   fixes["capillary/liquid"] = &create_fix<LAMMPS_NS::FixCapillaryLiquid>;
   fixes["energy/account"] = &create_fix<LAMMPS_NS::FixEnergyAccount>;
   fixes["integration/monitor"] = &create_fix<LAMMPS_NS::FixIntegrationMonitor>;

@@ -35,14 +35,17 @@ def test_a_contact_that_ends_forgets(tmp_path):
     assert load_at_second_touch(run(case, tmp_path / "stock", tangential="history")) > 0.1
 
 
-def jumping(folder, material, after: str, engines_loop: bool):
-    """Two grains touch and slide; in step 20 alone they are far apart, and later, by `after` (m), as before or at a gap."""
+def jumping(folder, material, after: str, engines_loop: bool = False, wall: bool = False):
+    """Two grains, or a grain and a wall, touch and slide; in step 20 alone they are far apart, and later, by `after` (m), as before or at a
+    gap."""
     k = "(t/0.000127-20)"
     slide = Path(displacement=("0.00001*(1-exp(-t/0.0003))", "0", f"-0.00002+{after}/(1+exp(-20*({k}+0.5)))+0.0015*exp(-25*{k}*{k})"),
                  velocity=("0.00001*exp(-t/0.0003)/0.0003", "0", "0"))
-    case = Scenario(name="jump", material=replace(material, restitution=1.0), time_step=1.27e-4, steps=45, stride=1,
-                    grains=(Grain(position=(0.0, 0.0, 5e-3), path=slide), Grain(position=(0.0, 0.0, -5e-3), path=STILL)))
-    text = deck(case).replace("neighbor 0.001 bin", "neighbor 0.004 bin")  # no new list that would end the contact
+    still = () if wall else (Grain(position=(0.0, 0.0, -5e-3), path=STILL),)
+    case = Scenario(name="jump", material=replace(material, restitution=1.0), time_step=1.27e-4, steps=45, stride=1, wall=wall,
+                    grains=(Grain(position=(0.0, 0.0, 5e-3), path=slide), *still))
+    # Of pairs no new list that would end the contact, of a wall one that the grain is not in.
+    text = deck(case).replace("neighbor 0.001 bin", f"neighbor {0.001 if wall else 0.004} bin")
     if engines_loop:  # a rolling model, here without resistance, stands in the way of ours
         models = next(line for line in text.splitlines() if line.startswith("pair_style"))
         rolling = "fix p_roll all property/global coefficientRollingFriction peratomtypepair 2 0 0 0 0\n"
@@ -64,6 +67,16 @@ def test_a_contact_forgets_though_the_grains_jump_out_of_reach(tmp_path, engines
 @pytest.mark.parametrize("engines_loop", [False, True])
 def test_a_bridge_ruptures_though_the_grains_jump_out_of_reach(tmp_path, engines_loop):
     pull = np.linalg.norm(jumping(tmp_path, WET, "0.00012", engines_loop).force, axis=-1)
+    assert (pull[:18] > 0.0).all() and (pull[20:] == 0.0).all()
+
+
+def test_a_contact_with_a_wall_ends_though_the_grain_jumps_off_the_list(tmp_path):
+    """The models see grains near a primitive wall only, by a list that may be new in each step."""
+    dry = jumping(tmp_path / "dry", DRY, "0", wall=True)
+    apart = np.flatnonzero(dry.normal_force == 0.0)
+    assert len(apart) == 1 and np.linalg.norm(dry.tangential_force[apart[0] - 1]) > 0.1 * dry.normal_force[apart[0] - 1]
+    assert np.linalg.norm(dry.tangential_force[apart[0] + 1]) < 0.01 * dry.normal_force[apart[0] + 1]
+    pull = np.linalg.norm(jumping(tmp_path / "wet", WET, "0.00012", wall=True).force, axis=-1)
     assert (pull[:18] > 0.0).all() and (pull[20:] == 0.0).all()
 
 
