@@ -163,7 +163,8 @@ void MonitorFix::begin_impacts(long n) {
       Vec3<double> gravity;
       if (dot(apart, apart) >= reach * reach || !weight(i, j, gravity) || !dembark::picked(one, two, n, run_.impacts)) continue;
       ShadowImpact shadow;
-      if (shadow.begin(parameters(atom->type[i], atom->type[j]), bodies(i, j), one, two, update->dt)) mine.push_back(shadow);
+      if (shadow.begin(parameters(atom->type[i], atom->type[j]), bodies(i, j), one, two, update->dt, {inertia(i), inertia(j)}))
+        mine.push_back(shadow);
     }
   const int own = int(mine.size() * sizeof(ShadowImpact));
   std::vector<int> counts(std::size_t(comm->nprocs), 0), offsets(std::size_t(comm -> nprocs), 0);

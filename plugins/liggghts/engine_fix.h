@@ -65,6 +65,7 @@ class EngineFix : public LAMMPS_NS::Fix {
 
   /// As `fix dt/reset` does it.
   void set_time_step(double dt) {
+    update->update_time();
     update->dt = dt;
     if (force->pair) force->pair->reset_dt();
     for (int k = 0; k < modify->nfix; ++k) modify->fix[k]->reset_dt();

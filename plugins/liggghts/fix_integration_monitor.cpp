@@ -1,5 +1,6 @@
 #include "fix_integration_monitor.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -10,6 +11,7 @@
 #include "fix_wall_gran.h"
 #include "neigh_list.h"
 #include "pair_gran.h"
+#include "pair_hybrid.h"
 #include "primitive_wall.h"
 #include "tri_mesh.h"
 
@@ -17,6 +19,13 @@
 
 using namespace LAMMPS_NS;
 using dembark_liggghts::PairParameters;
+
+/// Whether a pair style has no contacts of grains: one of a fluid, or a hybrid of such.
+static bool fluid_only(const Force &force) {
+  const auto fluid = [](const char *style) { return std::strncmp(style, "sph", 3) == 0; };
+  const auto *const hybrid = dynamic_cast<const PairHybrid *>(force.pair);
+  return hybrid ? std::all_of(hybrid->keywords, hybrid->keywords + hybrid->nstyles, fluid) : fluid(force.pair_style);
+}
 
 void FixIntegrationMonitor::post_create() {
   const std::string name = "accelerations_" + std::string(id);
@@ -35,10 +44,12 @@ void FixIntegrationMonitor::pre_delete(bool unfixed) {
   property_ = nullptr;
 }
 
-/// Stiffness is known of the normal models hertz and hooke. Without a granular pair style there are no contacts to judge.
+/// Stiffness is known of the normal models hertz and hooke. Without a pair style, or with a fluid alone, there are no contacts to judge.
 void FixIntegrationMonitor::find_contacts() {
   walls_.clear();
-  pair_ = dynamic_cast<PairGran *>(force->pair);
+  pair_ = dynamic_cast<PairGran *>(force->pair_match("gran", 0));
+  if (!pair_ && force->pair && !fluid_only(*force))
+    fail(std::string("it judges the contacts of one pair_style gran, alone or in a hybrid; there is pair_style ") + force->pair_style);
   if (!pair_) return;
   for (Fix *const fix : fixes())
     if (FixWallGran *const wall = dynamic_cast<FixWallGran *>(fix)) walls_.push_back(wall);

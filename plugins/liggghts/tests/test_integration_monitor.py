@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rig import liggghts_driver
+from rig import fluid, liggghts_driver
 from rig.chains import MATERIAL, RADIUS, CompressedChain, solitary_wave
 from rig.liggghts_driver import read_dump, run_deck
 from rig.monitor import MONITOR, POSITION, SPIN, THERMO, VELOCITY, assert_estimates_are_true, figures, line_of_grains
@@ -107,20 +107,23 @@ fix motion free nve/sphere
 {MONITOR}{words}
 variable n equal step
 variable h equal dt
-fix times all print 1 "${{n}} ${{h}}" file times.txt screen no
+variable now equal time
+fix times all print 1 "${{n}} ${{h}} ${{now}}" file times.txt screen no
 dump grains all custom 4 grains.dump id x vx
 dump_modify grains sort id format "%d %.17g %.17g"
 {rows}{THERMO}thermo 100
 run 8000"""))
         assert done.code == 0, done.error
         speeds[name] = np.array([frame[1:3, 2] for frame in read_dump(tmp_path / name / "grains.dump")[1]])
-    steps, lengths = np.loadtxt(tmp_path / "adapt" / "times.txt").T
+    steps, lengths, now = np.loadtxt(tmp_path / "adapt" / "times.txt").T
     assert lengths.min() < 1e-4 / 2 * 1.001
     # What is printed at the end of a step is the length of the next one.
     times = np.concatenate([[0.0], np.cumsum(np.concatenate([[1e-4], lengths[:-1]]))])
     at_rows = times[read_dump(tmp_path / "adapt" / "grains.dump")[0]]
     np.testing.assert_allclose(np.diff(at_rows), 4 * 1e-4, rtol=1e-9)
     assert steps[-1] == 8000
+    # And the clock, to its six digits in the file.
+    np.testing.assert_allclose(now, times[1:], rtol=1e-5, atol=1e-9)
 
     def change_of_speed(rows):
         """From flight to flight, rms of the later half."""
@@ -174,6 +177,46 @@ run {round(2.4e-3 / step)}""")
     assert np.log2(found[2.4e-5][22] / found[1.5e-6][22]) / 4 == pytest.approx(1.0, abs=0.3)
 
 
+def oblique(folder, dimension, motion):
+    """The largest deviation of one oblique impact with friction, with steps short enough for 1e-3."""
+    step = 2e-6 if dimension == 3 else 2e-5
+    text = line_of_grains(liggghts_driver, [-RADIUS - 1e-5, RADIUS + 1e-5], [0.5, -0.5], replace(BED, restitution=0.9), step, f"""\
+set atom 1 vy 0.3
+fix motion all {motion}
+{MONITOR}speed 1 every 1 impacts 1 action report
+{THERMO}thermo 100
+run 1500""")
+    if dimension == 2:
+        text = text.replace("boundary f f f", "dimension 2\nboundary f f p")
+    found = figures(run_deck(folder, text))[-1, 1:]
+    assert found[20] == 1
+    return found[21]
+
+
+@pytest.mark.parametrize(("dimension", "motion"), [(3, "nve/sphere"), (2, "nve/sphere"), (3, "nve"), (2, "nve")])
+def test_impacts_are_those_of_discs_in_the_plane_and_of_grains_that_do_not_turn(tmp_path, dimension, motion):
+    """The reference has the moments of inertia with which the engine turns the grains."""
+    assert oblique(tmp_path, dimension, motion) < 5e-3
+
+
+def test_contacts_of_a_hybrid_are_judged(tmp_path):
+    chain, steps = CompressedChain(0.2), 200
+    alone = figures(compressed(tmp_path / "alone", chain, steps))[-1]
+    assert alone[14] > 10
+    text = (tmp_path / "alone" / "case.in").read_text()
+    for k, style in enumerate(("hybrid", "hybrid/overlay")):
+        styled = text.replace("pair_style gran", f"pair_style {style} gran").replace("pair_coeff * *", "pair_coeff * * gran")
+        np.testing.assert_array_equal(figures(run_deck(tmp_path / str(k), styled))[-1], alone)
+
+
+def test_a_fluid_alone_has_no_contacts_to_judge(tmp_path):
+    watch = "group nobody type 99\nfix motion nobody nve/sphere\nfix watch nobody integration/monitor speed 1 length 1 every 1"
+    hybrid = (("pair_style sph", "pair_style hybrid/overlay sph"), ("pair_coeff * *", "pair_coeff * * sph/coupled"))
+    for k, changes in enumerate(((), hybrid)):
+        done = run_deck(tmp_path / str(k), fluid.deck(fluid.dam(), 2, extra=watch, changes=changes))
+        assert done.code == 0, done.error or done.output[-1500:]
+
+
 @pytest.mark.parametrize(("words", "told"), [
     ("", "it needs 'speed'"), ("speed", "speed: the value is missing"),
     ("speed fast", "speed: the value must be a number, not 'fast'"), ("speed 0", "it needs 'speed'"),
@@ -202,9 +245,11 @@ def test_walls_of_another_normal_model_are_refused(tmp_path):
 
 
 def test_what_it_cannot_judge_is_told(tmp_path):
+    soft = re.sub("pair_style gran.*\n.*", "pair_style soft 0.005\npair_coeff * * 1", bed("speed 1"))
     stock = bed("speed 1 impacts 1").replace("tangential finnie_rabinowicz", "tangential history").replace(" presliding linear", "")
     for k, (text, told) in enumerate(((stock, "tangential finnie_rabinowicz only"),
-                                      (bed("speed 1").replace("fix motion all nve/sphere\n", ""), "needs fix nve/sphere"))):
+                                      (bed("speed 1").replace("fix motion all nve/sphere\n", ""), "needs fix nve/sphere"),
+                                      (soft, "contacts of one pair_style gran, alone or in a hybrid; there is pair_style soft"))):
         done = run_deck(tmp_path / str(k), text)
         assert done.code != 0 and told in done.error, done.output[-1500:]
 

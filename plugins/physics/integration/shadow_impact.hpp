@@ -8,7 +8,8 @@
 // step to step with the mean velocity of the step, which is of second order. Touch and release are located. An engine has a new contact
 // first when it overlaps; no force has acted yet, so that the touch lies on a straight line before it.
 //
-// Spheres of homogeneous density without a liquid bridge. Accurate to 1e-4 of its speed without friction, to 5e-4 with it (see the tests).
+// Spheres or discs of homogeneous density without a liquid bridge. Accurate to 1e-4 of its speed without friction, to 5e-4 with it (see the
+// tests).
 #pragma once
 
 #include <algorithm>
@@ -61,12 +62,17 @@ inline double largest_overlap(const ContactParameters& p, double radius, double 
   return std::pow(15.0 / 8.0 * mass * speed * speed / unit, 0.4);  // m v^2 / 2 = 4/15 (unit) x^(5/2)
 }
 
+/// Moments of inertia over m r^2 with which two bodies turn: 2/5 of spheres, 1/2 of discs, 0 of what does not turn.
+struct PairInertia {
+  double factor_1 = 0.4, factor_2 = 0.4;
+};
+
 /// An impact from the touch to the release.
 class ReferenceImpact {
  public:
   /// `steps`: about how many to take for the time in contact.
-  ReferenceImpact(const ContactParameters& parameters, const ContactBodies& at_touch, int steps = 150)
-      : force_{parameters, at_touch}, bodies_(at_touch) {
+  ReferenceImpact(const ContactParameters& parameters, const ContactBodies& at_touch, const PairInertia& inertia = {}, int steps = 150)
+      : force_{parameters, inertia, at_touch}, bodies_(at_touch) {
     const double speed = -dot(at_touch.separation, at_touch.velocity_1 - at_touch.velocity_2) / norm(at_touch.separation);
     if (!(speed > 0.0)) return;
     const double overlap = largest_overlap(parameters, at_touch.effective_radius(), at_touch.effective_mass(), speed);
@@ -109,6 +115,7 @@ class ReferenceImpact {
   /// Derivatives, with the history of the contact as it was at the last step.
   struct Force {
     ContactParameters parameters;
+    PairInertia inertia;
     ContactBodies last;
     ContactState history{};
     double time = 0.0;
@@ -146,9 +153,12 @@ class ReferenceImpact {
       ContactState then;
       const ContactForce c = force->at(t, s, then);
       const ContactBodies& b = force->last;
-      const auto inertia = [](double mass, double radius) { return 0.4 * mass * radius * radius; };
-      pack({s[1] - s[2], c.force * (1.0 / b.mass_1), c.force * (-1.0 / b.mass_2), c.torque_1 * (1.0 / inertia(b.mass_1, b.radius_1)),
-            c.torque_2 * (1.0 / inertia(b.mass_2, b.radius_2))},
+      const auto turned = [](const Vec3<double>& torque, double factor, double mass, double radius) {
+        return torque * (factor > 0.0 ? 1.0 / (factor * mass * radius * radius) : 0.0);
+      };
+      pack({s[1] - s[2], c.force * (1.0 / b.mass_1), c.force * (-1.0 / b.mass_2),
+            turned(c.torque_1, force->inertia.factor_1, b.mass_1, b.radius_1),
+            turned(c.torque_2, force->inertia.factor_2, b.mass_2, b.radius_2)},
            f);
     }
   };
@@ -206,11 +216,11 @@ struct ShadowImpact {
   auto fields() { return std::tie(one, two, expected, momentum, mass_1, mass_2, radius_1, radius_2, speed, elapsed, duration); }
 
   /// Begins with bodies that overlap for the first time, less than `step` (s) after their touch. False where there is nothing to compare.
-  bool begin(const ContactParameters& p, ContactBodies b, long first, long second, double step) {
+  bool begin(const ContactParameters& p, ContactBodies b, long first, long second, double step, const PairInertia& inertia = {}) {
     if (std::isinf(b.mass_1) || std::isinf(b.mass_2) || p.cohesion.on()) return false;
     elapsed = back_to_touch(b, step);
     if (elapsed < 0.0) return false;
-    const ReferenceImpact reference(p, b);
+    const ReferenceImpact reference(p, b, inertia);
     if (!reference.ended()) return false;
     one = first;
     two = second;

@@ -33,20 +33,23 @@ ContactBodies spheres(const Vec3<double>& approach, const Vec3<double>& spin = {
 }
 
 /// The same by leapfrog as engines do it, forces with the velocities of half a step before, from a touch `phase` steps ago.
-double engine_deviation(const ContactParameters& p, ContactBodies b, double h, double phase) {
+double engine_deviation(const ContactParameters& p, ContactBodies b, double h, double phase, const PairInertia& inertia = {}) {
   const auto move = [&b](double t) { b.separation += t * (b.velocity_1 - b.velocity_2); };
   move(phase * h);
   ShadowImpact shadow;
   ContactState state;
-  REQUIRE(shadow.begin(p, b, 4, 9, h));
+  REQUIRE(shadow.begin(p, b, 4, 9, h, inertia));
   CHECK_THAT(shadow.elapsed, WithinRel(phase * h, 1e-6));
+  const auto turn = [h](Vec3<double>& spin, double factor, double mass, double radius, const Vec3<double>& torque) {
+    if (factor > 0.0) spin += (h / (factor * mass * radius * radius)) * torque;
+  };
   double found = -1.0;
   for (auto stage = ShadowImpact::Stage::going_on; stage == ShadowImpact::Stage::going_on;) {
     const ContactForce f = contact_step(p, b, h, state);
     b.velocity_1 += (h / b.mass_1) * f.force;
     b.velocity_2 -= (h / b.mass_2) * f.force;
-    b.angular_velocity_1 += (h / (0.4 * b.mass_1 * b.radius_1 * b.radius_1)) * f.torque_1;
-    b.angular_velocity_2 += (h / (0.4 * b.mass_2 * b.radius_2 * b.radius_2)) * f.torque_2;
+    turn(b.angular_velocity_1, inertia.factor_1, b.mass_1, b.radius_1, f.torque_1);
+    turn(b.angular_velocity_2, inertia.factor_2, b.mass_2, b.radius_2, f.torque_2);
     move(h);
     stage = shadow.follow(b, {}, h, found);
     REQUIRE(stage != ShadowImpact::Stage::dropped);
@@ -54,10 +57,10 @@ double engine_deviation(const ContactParameters& p, ContactBodies b, double h, d
   return found;
 }
 
-double rms_deviation(const ContactParameters& p, const ContactBodies& b, double h) {
+double rms_deviation(const ContactParameters& p, const ContactBodies& b, double h, const PairInertia& inertia = {}) {
   double sum = 0.0;
   for (int k = 0; k < 8; ++k) {
-    const double d = engine_deviation(p, b, h * (1.0 + 0.0173 * k), (k + 0.5) / 8.0);
+    const double d = engine_deviation(p, b, h * (1.0 + 0.0173 * k), (k + 0.5) / 8.0, inertia);
     sum += d * d / 8.0;
   }
   return std::sqrt(sum);
@@ -88,7 +91,7 @@ TEST_CASE("shadow impacts: an oblique impact with friction does not depend on th
   for (const double friction : {0.1, 0.6}) {
     const ContactParameters p = material(0.7, friction);
     const ContactBodies b = spheres({-0.7, 0.3, -0.2}, {40, -20, 90});
-    const PairMotion some = ReferenceImpact(p, b).outgoing(), more = ReferenceImpact(p, b, 1200).outgoing();
+    const PairMotion some = ReferenceImpact(p, b).outgoing(), more = ReferenceImpact(p, b, {}, 1200).outgoing();
     CAPTURE(friction);
     CHECK(deviation(some, more, b.radius_1, b.radius_2, norm(b.velocity_1)) < 5e-4);
     CHECK(norm(more.spin_1 - b.angular_velocity_1) > 1.0);
@@ -98,7 +101,7 @@ TEST_CASE("shadow impacts: an oblique impact with friction does not depend on th
 TEST_CASE("shadow impacts: damping that begins with the fourth root of the overlap", "[shadow]") {
   const ContactParameters p = material(0.6, 0.0);
   const ContactBodies b = spheres({-0.7, 0, 0});
-  const double some = ReferenceImpact(p, b).outgoing().velocity.x, more = ReferenceImpact(p, b, 1200).outgoing().velocity.x;
+  const double some = ReferenceImpact(p, b).outgoing().velocity.x, more = ReferenceImpact(p, b, {}, 1200).outgoing().velocity.x;
   CHECK_THAT(some, WithinRel(more, 1e-4));
 }
 
@@ -117,6 +120,13 @@ TEST_CASE("shadow impacts: an engine comes to the reference", "[shadow]") {
   const ContactParameters p = material(0.7, 0.3);
   const ContactBodies b = spheres({-0.7, 0.3, -0.2}, {40, -20, 90});
   CHECK(rms_deviation(p, b, ReferenceImpact(p, b).duration() / 2000) < 2e-3);
+  // Discs, one that does not turn, and none that does.
+  for (const PairInertia& other : {PairInertia{0.5, 0.5}, PairInertia{0.4, 0.0}, PairInertia{0.0, 0.0}}) {
+    const ReferenceImpact impact(p, b, other);
+    CAPTURE(other.factor_1, other.factor_2);
+    CHECK(rms_deviation(p, b, impact.duration() / 2000, other) < 2e-3);
+    CHECK(deviation(impact.outgoing(), ReferenceImpact(p, b).outgoing(), b.radius_1, b.radius_2, norm(b.velocity_1)) > 1e-2);
+  }
 }
 
 TEST_CASE("shadow impacts: what is no impact of two is left out", "[shadow]") {
