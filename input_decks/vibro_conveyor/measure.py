@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from dembark.input_decks.common.drive_levels import acceleration
-from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
+from dembark.input_decks.common.momentum import BRIDGED_PARTS, imbalance
 from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.measurement import (
     Array,
@@ -86,7 +86,7 @@ def measure(replicas: Replicas) -> Measurement:
     still, theory = single and slips_nowhere(p), expected(p)
     block = single and p["spin"] == "blocked" and coulomb(p)
     values = {
-        "energy_balance": Value(exact(max(imbalance(run.times(), CONTACT_PARTS) for run in replicas)), exact(0.0)),
+        "energy_balance": Value(exact(max(imbalance(run.times(), BRIDGED_PARTS) for run in replicas)), exact(0.0)),
         **({"rest_speed": Value(ratio, exact(0.0))} if still else
            {"transport_speed": Value(ratio, exact(theory) if block else None)}),
         "flight": Value(exact(float(np.mean([flight(run) for run in replicas])))),
