@@ -117,6 +117,21 @@ def studied(friction: float = 1.0, sign: float = 1.0) -> Any:
     return judged("vibro_conveyor", conveyor.study("throw", points, "motion_gamma"))
 
 
+@pytest.mark.parametrize(("throw", "restitution"), [(2.0, 0.5), (3.0, 0.3), (1.5, 0.7)])
+def test_a_block_that_bounces_irregularly_has_no_expected_speed(throw: float, restitution: float) -> None:
+    changes = {"motion_gamma": throw, "restitution": restitution}
+    found = verdicts(**changes)["transport_speed"]
+    assert found["verdict"] == "info" and "differ by" in found["reason"]
+    points = [point(parameters(variant) | {"restitution": restitution}, {"transport_speed": 0.3}, None)
+              for variant in ("g15", "throws", "g3")]
+    assert judged("vibro_conveyor", conveyor.study("throw", points, "motion_gamma"))["speed_rise"]["verdict"] == "info"
+
+
+@pytest.mark.parametrize("variant", ["slides", "g04", "g11", "g15", "throws", "g25", "g3"])
+def test_the_blocks_of_the_study_repeat_themselves(variant: str) -> None:
+    assert not conveyor.irregular(parameters(variant))
+
+
 def test_the_work_of_bridges_is_in_the_balance() -> None:
     assert "energy_balance" in names(verdicts(wet=0.3, bridge_volume=8e-11), "pass")
 
