@@ -20,7 +20,6 @@ from dembark.postproc.measurement import Array, Estimate, Measurement, Points, R
 WAYS = {"kinetic": "Kinetic energy", "friction": "Dissipated by friction", "normal_viscous": "Dissipated by normal damping",
         "tangential_viscous": "Dissipated by tangential damping", "held": "Elastic energy of springs", "gate": "Work on the gate"}
 WET = {"liquid_viscous": "Dissipated in the viscous liquid", "capillary": "Work against liquid bridges"}
-PARTS = (*momentum.CONTACT_PARTS, "capillary", "liquid_viscous")
 DISSIPATING = ("normal_viscous", "tangential_viscous", "liquid_viscous")
 # Share of the mass behind the front: single grains roll on after the others have come to rest.
 FRONT = 0.98
@@ -128,7 +127,7 @@ def measure(replicas: Replicas) -> Measurement:
 
     aspect = over(lambda one: height(one.first) / one.width)
     values = {
-        "energy_balance": worst(lambda one: momentum.imbalance(one.rows, PARTS)),
+        "energy_balance": worst(lambda one: momentum.imbalance(one.rows, momentum.BRIDGED_PARTS)),
         "potential_error": worst(Collapse.potential_error),
         "dissipation_sign": worst(Collapse.given_back),
         "step_error": Value(over(lambda one: float(np.abs(one.gain("step_error")).max() / one.fallen))),

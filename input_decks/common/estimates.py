@@ -12,7 +12,7 @@ from dembark.common.choices import nearest
 from dembark.common.errors import DembarkError
 from dembark.common.tables import read_table
 from dembark.common.units import finite
-from dembark.postproc.measurement import Array, Estimate, over_replicas
+from dembark.postproc.measurement import Array, Estimate, Numbers, over_replicas
 from dembark.postproc.statistics import combined
 
 
@@ -35,6 +35,13 @@ def ratio(one: Estimate, other: Estimate) -> Estimate:
 def values_and_halves(found: Sequence[Estimate]) -> tuple[Array, Array]:
     """Values (n,) and half-widths (n,) of their intervals."""
     return np.array([one.value for one in found]), np.array([one.half for one in found])
+
+
+def unlike(p: Numbers, published: Mapping[str, float]) -> str:
+    """Why a run with the parameters `p` is not compared with an experiment, by those of its set-up that are `published`; "" where all are
+    the same."""
+    other = [f"{name} = {value:g}" for name, value in published.items() if not math.isclose(p[name], value, rel_tol=1e-6)]
+    return f"the experiment had {', '.join(other)}" if other else ""
 
 
 class Row(dict[str, str]):

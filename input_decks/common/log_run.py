@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from dembark.postproc import DumpError
 from dembark.postproc.dumps import TextDump
-from dembark.postproc.measurement import Value, number, profile
+from dembark.postproc.measurement import Value, exact, number, profile
 from dembark.postproc.replica import Array, Replica, cached_per_replica
 
 # Points of a curve, twice as many at most.
@@ -104,6 +105,16 @@ def read(replica: Replica) -> LogRun:
                                          for name in ("positions", "velocities", "omegas", "forces"))
     return LogRun(replica.parameters, replica.time_step, steps * replica.time_step, places, velocities, spins, forces, first.masses,
                   first.radii, history, replica.impacts(), touches)
+
+
+def unended(values: Mapping[str, Value], names: Sequence[str]) -> dict[str, Value]:
+    """The `values` of a run that ends before its impacts do: those of `names` are not known, and the peak force is the largest so far."""
+    reason = "the run ends before the last impact does: take a longer duration"
+
+    def unknown(name: str, one: Value) -> Value:
+        return replace(one, estimate=one.estimate if name == "peak_force" else exact(math.nan), bound=None, reason=reason)
+
+    return {name: unknown(name, one) if name in names else one for name, one in values.items()}
 
 
 def solver_values(run: LogRun) -> dict[str, Value]:

@@ -11,8 +11,9 @@ import numpy as np
 from dembark.postproc.grains import GrainFrame
 from dembark.postproc.measurement import Array
 
-# Parts of the contact forces in the energy account: of dry contacts without rolling resistance, and all.
+# Parts of the contact forces in the energy account: of dry contacts without rolling resistance, the same with liquid bridges, and all.
 CONTACT_PARTS = ("normal_elastic", "normal_viscous", "tangential_elastic", "tangential_viscous")
+BRIDGED_PARTS = (*CONTACT_PARTS, "capillary", "liquid_viscous")
 PARTS = (*CONTACT_PARTS, "rolling_elastic", "rolling_viscous", "capillary", "liquid_viscous")
 Rows = Mapping[str, Array]
 

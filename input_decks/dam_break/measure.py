@@ -81,13 +81,21 @@ def due(source: str, found: tuple[Estimate, Estimate]) -> tuple[Estimate, Estima
             Estimate(0.5 * float(published(source)[0][0]), delay.half, delay.basis))
 
 
+def at_3(own: tuple[Array, Array], p: Numbers) -> Value:
+    """The front `own` at T = 3; none where the run ends before, or where it has come to the end of the tank."""
+    found = float(np.interp(3.0, *own, right=math.nan))
+    if found > p["tank_length"] - 1.0 / p["resolution"]:
+        return Value(exact(math.nan), reason="the front is at the end of the tank before T = 3: take a larger tank_length")
+    return Value(exact(found), reason="" if math.isfinite(found) else "the run ends before T = 3: take a longer run_time")
+
+
 def measure(replicas: Replicas) -> Measurement:
     """Of the one run: nothing is random. What has no spacings to be studied with is judged by itself."""
     run = replicas[0]
     own, p = front(run), run.parameters
     energy = p["fluid_density"] * p["gravity"] * 2.0 * p["column_width"] ** 3
     thick = thick_front(run)
-    values = {"front_at_3": Value(exact(float(np.interp(3.0, *own)))), "thick_front_at_3": Value(exact(float(np.interp(3.0, *thick)))),
+    values = {"front_at_3": at_3(own, p), "thick_front_at_3": at_3(thick, p),
               "thick_speed": Value(pace(thick, "martin_moyce")[0]), **common_values(run, energy)}
     for source in NAMES:
         found = pace(own, source)
@@ -100,8 +108,9 @@ def measure(replicas: Replicas) -> Measurement:
 def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001 (there is one study)
     """The front with the finest particles compared with the experiments, and how far the two finest are apart."""
     points, place = ordered(points, along)
-    fronts = np.array([measured(point, "front_at_3").value for point in points])
-    values = {"front_converged": Value(exact(fronts[-1] - fronts[-2]), exact(0.0))}
+    fronts = np.array([_known(point, "front_at_3").value for point in points])
+    known = bool(np.isfinite(fronts).all())
+    values = {"front_converged": Value(exact(fronts[-1] - fronts[-2]), exact(0.0), reason="" if known else "no front at T = 3 in each run")}
     for source in NAMES:
         every = [[_known(point, f"{what}_{source}") for point in points] for what in ("speed", "delay")]
         references = due(source, (every[0][-1], every[1][-1]))
@@ -110,6 +119,8 @@ def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001
             value = found[-1].value
             values[f"{what}_{source}"] = Value(Estimate(value, of_spacing, "spacing"), reference,
                                                detail=compared(value, reference, num=of_spacing).text)
+    if not known:
+        return Measurement(values)
     curve = PowerLawFit(place, fronts, 0.0 * fronts).curve("front", "Front at T = 3", "particles across the column", "over a")
     return Measurement(values, [curve])
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dembark.input_decks.common.estimates import reference_rows
+from dembark.input_decks.common.estimates import reference_rows, unlike
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.common.water_run import Tank
 from dembark.postproc.convergence import convergence
@@ -27,8 +27,14 @@ NEAR_FLOOR = 0.05  # m: gaps are looked at below this height
 BARE = (1.0, 1.7)  # m along the flume, before the cubes
 WORST = ("inside", "leaked", "overtopped", "energy_growth", "overlap")
 CONVERGING = (("x_end", "x of the top cube at 1.5 s", "m"), ("half_fallen", "Time at which the top cube is half fallen", "s"))
+# The flume, the column and the cubes of the experiment, of which its figures hold; the length of the column counts from 1.5 m on, the rest
+# of the flume from where the cubes are pushed to.
+PUBLISHED = {"column_height": 0.4, "flume_width": 0.7, "edge": 0.15, "cube_density": 800.0, "distance": 1.7, "fluid_density": 1000.0,
+             "gravity": 9.81}
+LEAST_LENGTHS = {"column_length": 1.5, "downstream_length": 3.5}
 # Of which arrangements there are data that agree with each other.
 JUDGED = ("three", "six")
+OF_EXPERIMENT = ("three_rms_x", "six_rms_x", "half_fallen", "rise")
 
 
 def published(cubes: str, axis: str) -> tuple[Array, Array]:
@@ -106,7 +112,8 @@ def cube_history(run: Replica) -> dict[str, float]:
     p, rows = run.parameters, run.times()
     cubes, top = p["arrangement"], int(run.derived["cube_count"])
     time, x, z = rows["time"], rows[f"cube{top}_x"], rows[f"cube{top}_z"]
-    found = {"rise": float(np.max(z[time <= 1.0]) - z[0]), "x_end": float(np.interp(1.5, time, x, right=np.nan))}
+    found = {"rise": float(np.max(z[time <= 1.0]) - z[0]) if time[-1] >= 1.0 - 1e-9 else float("nan"),
+             "x_end": float(np.interp(1.5, time, x, right=np.nan))}
     # What can be turned over: the column that comes to lie on the floor.
     energy = 0.5 * p["fluid_density"] * p["gravity"] * p["column_length"] * p["flume_width"] * p["column_height"] ** 2
     stored = np.sum([rows[name] for name in STORED], axis=0)
@@ -157,7 +164,8 @@ def measure(replicas: Replicas) -> Measurement:
     cubes = p["arrangement"]
     late = "the run ends before 1.5 s"
     due = {"rise": 0.0, "inside": 0.0, "leaked": 0.0, "energy_growth": 0.0, "three_rms_x": 0.0, "six_rms_x": 0.0}
-    missing = {"arrival": "the front does not reach the cubes", "x_end": late, "floor_wetted": late, "half_fallen": "the run ends before",
+    missing = {"rise": "the run ends before 1 s", "arrival": "the front does not reach the cubes", "x_end": late, "floor_wetted": late,
+               "half_fallen": "the run ends before",
                "gap_filled": "the lowest cubes are not side by side while the flow passes"}
     of_water = ["arrival", "inside", "leaked", "overtopped", "floor_wetted"]
     # Into narrower gaps no particle gets.
@@ -168,10 +176,12 @@ def measure(replicas: Replicas) -> Measurement:
         due["half_fallen"] = half_fallen(cubes, p["edge"])
     noisy = p["lattice_noise"] > 0.0 or p["cube_noise"] > 0.0
     values = {}
+    other = unlike(p, PUBLISHED | {name: value for name, value in LEAST_LENGTHS.items() if p[name] < value})
     for name in every[0]:
         # What may in no run happen is that of the worst.
         mean = exact(max(one[name] for one in every)) if name in WORST else mean_of([one[name] for one in every], noisy)
-        values[name] = Value(mean, exact(due[name]) if name in due else None, reason="" if np.isfinite(mean.value) else missing[name])
+        values[name] = Value(mean, exact(due[name]) if name in due else None, reason="" if np.isfinite(mean.value) else missing[name],
+                             inapplicable=other if name in OF_EXPERIMENT else "")
     return Measurement(values, curves(replicas))
 
 

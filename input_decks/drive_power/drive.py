@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from dembark.input_decks.common.drive_levels import acceleration
-from dembark.input_decks.common.momentum import CONTACT_PARTS
+from dembark.input_decks.common.momentum import BRIDGED_PARTS
 from dembark.postproc import DumpError
 from dembark.postproc.measurement import Array, Curve, Estimate, Replica, block_mean, profile
 
@@ -90,8 +90,8 @@ class Drive:
         return self.gain("plate_work") / self.gain("walls") - 1.0
 
     def dissipation_gap(self) -> float:
-        """Work of the walls over what contacts have taken in the window and do not hold, less 1."""
-        return self.gain("walls") / -sum(self.gain(name) for name in (*CONTACT_PARTS, *STORED)) - 1.0
+        """Work of the walls over what contacts and bridges have taken in the window and do not hold, less 1."""
+        return self.gain("walls") / -sum(self.gain(name) for name in (*BRIDGED_PARTS, *STORED)) - 1.0
 
     def flight(self) -> Estimate:
         """Share of the time in which the force on the plate is below FLIGHT of the weight."""

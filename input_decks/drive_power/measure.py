@@ -7,12 +7,24 @@ import numpy as np
 
 from dembark.input_decks.common.drive_levels import acceleration
 from dembark.input_decks.common.estimates import divided, over_chaotic, values_and_halves
-from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
+from dembark.input_decks.common.momentum import BRIDGED_PARTS, imbalance
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
-from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, over_replicas, profile
+from dembark.postproc.measurement import (
+    Array,
+    Curve,
+    Estimate,
+    Measurement,
+    Numbers,
+    Points,
+    Replicas,
+    Value,
+    exact,
+    over_replicas,
+    profile,
+)
 from dembark.postproc.studies import measured
 
-from .drive import Drive, phases, read, sticking_block, transients
+from .drive import Block, Drive, phases, read, sticking_block, transients
 
 # Up to this coefficient of restitution the bed counts as one that sticks.
 STICKS = 0.3
@@ -24,12 +36,17 @@ FALL = 0.5
 SPECTRUM = ("height_first_harmonic", "height_second_harmonic", "height_fluctuation")
 
 
+def sticks(p: Numbers) -> Block | None:
+    """The block that a bed with the parameters `p` counts as; None where grains bounce well, or liquid holds them on the plate."""
+    return sticking_block(acceleration(p)) if p["restitution"] <= STICKS and not p["bridge_volume"] else None
+
+
 def measure(replicas: Replicas) -> Measurement:
     """Values, curves and remarks from all replicas of a series."""
     runs, p = [read(replica) for replica in replicas], replicas[0].parameters
     # A window in which the plate stops is not that of a steady drive.
     steady = not p["rest_periods"]
-    block = sticking_block(acceleration(p)) if steady and p["restitution"] <= STICKS else None
+    block = sticks(p) if steady else None
     diameter = p["grain_diameter"]
 
     def over(number: Callable[[Drive], Estimate], scale: float = 1.0) -> Estimate:
@@ -46,7 +63,7 @@ def measure(replicas: Replicas) -> Measurement:
         return Value(exact(number(runs[0])) if len(runs) == 1 else once(number).estimate, exact(0.0))
 
     values = {
-        "energy_balance": worst(lambda one: imbalance(one.rows, CONTACT_PARTS)),
+        "energy_balance": worst(lambda one: imbalance(one.rows, BRIDGED_PARTS)),
         "power_gap": worst(Drive.power_gap),
         **({"dissipation_gap": mean(Drive.dissipation_gap)} if steady else {}),
         "power": Value(over(Drive.power), exact(block.power) if block else None),
@@ -69,7 +86,7 @@ def measure(replicas: Replicas) -> Measurement:
 
 def stiffness(points: Points, moduli: Array) -> list[Curve]:
     """Power and time in flight over Young's modulus (Pa), and those of a block that sticks."""
-    block = sticking_block(acceleration(points[0]["parameters"]))
+    block = sticks(points[0]["parameters"])
 
     def curve(quantity: str, title: str, axis: str) -> Curve:
         values, halves = values_and_halves([measured(point, quantity) for point in points])

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from dembark.input_decks.common.log_run import read, solver_values
+from dembark.input_decks.common.log_run import read, solver_values, unended
 from dembark.input_decks.log_pair.exact_motion import row_curves
 from dembark.physics.exact.chains import Chain
 from dembark.postproc.measurement import Measurement, Numbers, Replicas, number
@@ -38,6 +38,10 @@ def measure(replicas: Replicas) -> Measurement:
         "momentum_error": number(run.momentum_error(), 0.0),
         **solver_values(run),
     }
+    # Logs that still press or approach each other have an impact before them.
+    if motion.forces[-1].any() or np.diff(due).min() < -1e-9 * speed:
+        of_all = ["scheme_deviation", "peak_force", "energy_kept"]
+        values = unended(values, [name for name in values if name.startswith("velocity_")] + of_all)
     shares = ", ".join(f"{value:.4f}" for value in due / speed)
     return Measurement(values, row_curves(run, chain, motion), [
         (f"Exact velocities after, over that of the first log: {shares} ({motion.events} contacts close or open meanwhile). All act at "

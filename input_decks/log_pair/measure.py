@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dembark.input_decks.common.log_run import read, solver_values
+from dembark.input_decks.common.log_run import read, solver_values, unended
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.physics.exact.pairs import Pair
 from dembark.postproc.measurement import Measurement, Numbers, Points, Replicas, number
@@ -51,10 +51,13 @@ def measure(replicas: Replicas) -> Measurement:
     }
     if not on_wall:
         values |= {"momentum_error": number(run.momentum_error(), 0.0), "angular_momentum_error": number(run.angular_momentum_error(), 0.0)}
+    early = run.times[-1] < motion.end
+    if early:
+        values = unended(values, [name for name, one in values.items() if one.bound is not None or name == "energy_change"])
     if damped:
         values |= {name: replace(one, bound=None, reason="there is no formula for the dissipation of the scheme with damping")
                    for name, one in values.items() if one.bound is not None}
-    elif bodies.offset == 0.0 and len(run.impacts):
+    elif bodies.offset == 0.0 and len(run.impacts) and not early:
         change = p["mass_1"] * float(np.linalg.norm(run.velocities[-1, 0] - run.velocities[0, 0]))
         values["impulse"] = number(run.impacts[0, 5], change, scale=change)
     return Measurement(values, pair_curves(run, bodies, motion),

@@ -22,12 +22,13 @@ FIRST = 10  # impacts from the beginning in which two engines have to be the sam
 @dataclass(frozen=True)
 class Loads:
     """What contacts carry in all frames, in N, along x and y. `walls` (frames, walls, 2): force of each wall on the logs; `net` (frames, n,
-    2): sum of the contact forces on each log; `contacts` (frames,): how many carry; `mobilised` (frames,): mean of |T| / N, NaN without
-    contacts."""
+    2): sum of the contact forces on each log; `contacts` (frames,): how many carry; `alone` (frames,): logs that have a single one, with
+    the ground; `mobilised` (frames,): mean of |T| / N, NaN without contacts."""
 
     walls: Array
     net: Array
     contacts: Array
+    alone: Array
     mobilised: Array
 
 
@@ -35,16 +36,19 @@ def loads(run: LogRun, walls: Sequence[int]) -> Loads:
     """Sums over the contacts of each frame; `walls`: the ids of those to tell apart."""
     frames, logs = run.positions.shape[:2]
     on_walls, net, mobilised = np.zeros((frames, len(walls), 2)), np.zeros((frames, logs, 2)), np.full(frames, np.nan)
+    alone = np.zeros(frames)
     for frame, touch in enumerate(run.touches):
         on_first = (touch.normals * touch.forces[:, None] + touch.friction)[:, :2]
         first, second = touch.ids.T
         np.add.at(net[frame], first - 1, on_first)
         pair = second > 0
         np.add.at(net[frame], second[pair] - 1, -on_first[pair])
+        held = np.bincount(np.concatenate([first, second[pair]]) - 1, minlength=logs)
+        alone[frame] = np.sum(held[first[second == WALLS[0]] - 1] == 1)
         on_walls[frame] = [on_first[second == wall].sum(axis=0) for wall in walls]
         if len(touch.forces):
             mobilised[frame] = float(np.mean(np.linalg.norm(touch.friction, axis=1) / touch.forces))
-    return Loads(on_walls, net, np.array([len(touch.forces) for touch in run.touches], float), mobilised)
+    return Loads(on_walls, net, np.array([len(touch.forces) for touch in run.touches], float), alone, mobilised)
 
 
 def before_impact(run: LogRun, count: int) -> tuple[int, NDArray[np.int64], Array]:
@@ -89,14 +93,17 @@ def _together(values: Sequence[Value]) -> Value:
 
 
 def at_rest(run: LogRun, stack: Loads, rest: slice) -> dict[str, Value]:
-    """Forces on ground, stakes and each log, and the number of contacts: at least as many unknowns as equations."""
+    """Forces on ground, stakes and each log, and the number of contacts: at least as many unknowns as equations. A log that lies alone on
+    the ground rests on one."""
     p, weights, logs = run.parameters, run.masses * run.parameters["gravity"], len(run.masses)
     walls, down = stack.walls[rest] / weights.sum(), np.stack([0.0 * weights, weights], axis=1)
     speed = math.sqrt(float((run.velocities[rest] ** 2).sum(axis=2).mean()) / (p["gravity"] * 2.0 * p["radius"]))
     net = np.linalg.norm(stack.net[rest].mean(axis=0) - down, axis=1) / weights
     rough, per_log, one = p["friction"] > 0.0, block_mean(stack.contacts[rest] / logs), exact(1.0)
-    least = 1.5 if rough else 2.0
+    alone = float(stack.alone[rest].mean()) / logs
+    least = (1.5 if rough else 2.0) * (1.0 - alone) + alone
     counted = "3/2: three equations per log, two unknowns per contact" if rough else "2: two equations per log, one unknown per contact"
+    counted += f"; 1 for the {alone * logs:.3g} that lie alone on the ground" if alone else ""
     values = {
         "lift_over_weight": Value(block_mean(walls[:, :, 1].sum(axis=1)), one),
         "ground_share": Value(block_mean(walls[:, 0, 1]), one if p["stake_friction"] == 0.0 else None),

@@ -42,15 +42,16 @@ def verdicts(**changes: Any) -> dict[str, dict[str, Any]]:
     return judged("bead_chain", chain.measure([run(**changes)]))
 
 
-def study(power: float) -> dict[str, dict[str, Any]]:
+def study(power: float, **changes: float) -> dict[str, dict[str, Any]]:
     """Waves whose speed grows with this power of their force."""
-    points = [point({"hit_speed": force}, {"peak_force": force, "velocity": 8.0 * force**power}) for force in (0.05, 0.4, 2.0)]
+    points = [point(defaults("bead_chain", hit_speed=force, **changes),
+                    {"peak_force": force, "velocity": 8.0 * force**power}) for force in (0.05, 0.4, 2.0)]
     return judged("bead_chain", chain.study("force", points, "hit_speed"))
 
 
-def passed(stiffer: float = 1.0) -> dict[str, dict[str, Any]]:
+def passed(stiffer: float = 1.0, **changes: float) -> dict[str, dict[str, Any]]:
     """A front in a layer whose springs are `stiffer` than stated."""
-    p, turn = defaults("bead_chain", grain_count=120, lattice="hexagonal", columns=4, overlap=5e-6, hit_speed=2e-5), 2000.0
+    p, turn = defaults("bead_chain", grain_count=120, lattice="hexagonal", columns=4, overlap=5e-6, hit_speed=2e-5, **changes), 2000.0
     steps = 20 * np.arange(1, 121)
     speeds = 1e-5 * chain.lattice(120, np.sqrt(stiffer) * turn * DT * steps)
     frames = [frame_of(np.zeros((480, 3)), 0.5 * D, {}, step=int(step), velocities=np.repeat(speed, 4)[:, None] * [1.0, 0.0, 0.0])
@@ -115,6 +116,21 @@ def test_planes_that_get_closer_press_with_their_contacts(lattice: str) -> None:
     length = np.linalg.norm(ahead, axis=1)
     force = (hertz(p) * np.maximum(p.grain_diameter - length, 0.0) ** 1.5 * ahead[:, 0] / length).sum()
     assert force == pytest.approx(plane_stiffness(p) * moved**1.5, rel=1e-4)
+
+
+@pytest.mark.parametrize(("change", "named"), [({"bridge_volume": 8e-11}, "dry"), ({"restitution": 0.9}, "elastic")])
+def test_wet_or_inelastic_spheres_are_not_judged_by_the_theory_of_dry_elastic_ones(change: dict[str, float], named: str) -> None:
+    one = run()
+    one.parameters |= change
+    found = judged("bead_chain", chain.measure([one]))
+    for name in ("wave_speed", "wave_decay"):
+        assert found[name]["verdict"] == "info" and named in found[name]["reason"], name
+    front = passed(**change)
+    for name in ("front_speed", "front_profile"):
+        assert front[name]["verdict"] == "info" and named in front[name]["reason"], name
+    assert study(1.0 / 6.0, **change)["force_exponent"]["verdict"] == "info"
+    rubs = passed(grain_friction=0.3)["front_speed"]
+    assert rubs["verdict"] == "info" and "friction" in rubs["reason"]
 
 
 def test_a_known_wave() -> None:

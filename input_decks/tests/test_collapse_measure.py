@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dembark.input_decks.column_collapse.measure import PARTS
+from dembark.input_decks.common.momentum import BRIDGED_PARTS
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, point
 from dembark.postproc import DumpError
 from dembark.postproc.replica import Replica
@@ -37,10 +37,10 @@ def rows() -> Rows:
     table["normal_viscous"] = table["normal_viscous"] - 0.05 * rain - 1e-6
     table["step_error"] = -1e-5 * fall
     table["normal_elastic"] = table["step_error"] - table["normal_stored"]
-    others = sum(table[name] for name in ("gravity", "walls", "first_kinetic", *PARTS) if name != "tangential_elastic")
+    others = sum(table[name] for name in ("gravity", "walls", "first_kinetic", *BRIDGED_PARTS) if name != "tangential_elastic")
     table["tangential_elastic"] = table["kinetic_energy"] - others
     table |= {"other": np.zeros(ROWS), "imposed": np.zeros(ROWS), "balance": np.zeros(ROWS), "potential_energy": 0.1 - table["gravity"]}
-    table["scale"] = 1e-6 + sum(np.abs(table[name]) for name in ("gravity", "walls", *PARTS))
+    table["scale"] = 1e-6 + sum(np.abs(table[name]) for name in ("gravity", "walls", *BRIDGED_PARTS))
     table["weight_height"] = table["potential_energy"] + 1e-9 * fall
     return table
 

@@ -51,7 +51,8 @@ def study(apart: float = 0.0, **changes: Any) -> dict[str, dict[str, Any]]:
     """The study of a front that has no error of spacing but that at T = 3 the two finest are `apart`."""
     found = verdicts(**changes)
     points = [{"parameters": {"resolution": number}, "quantities": [
-        *(one for name, one in found.items() if name != "front_at_3"), {"name": "front_at_3", "value": value, "interval": [value, value]}]}
+        *(one for name, one in found.items() if name != "front_at_3"),
+        {"name": "front_at_3", "value": None if math.isnan(value) else value, "interval": [value, value]}]}
         for number, value in ((10, 3.9), (20, 4.0), (40, 4.0 + apart))]
     return judged("dam_break", dam.study("spacing", points, "resolution"))
 
@@ -82,6 +83,19 @@ def test_the_two_experiments_contradict_each_other_and_the_two_sizes_of_the_firs
     # So the later one cannot decide 5 %.
     found = study()
     assert found["speed_koshizuka_oka"]["verdict"] == "info" and "wider" in found["speed_koshizuka_oka"]["reason"]
+
+
+def test_there_is_no_front_at_a_time_that_is_not_in_the_run_or_behind_the_end_of_the_tank() -> None:
+    short, small = run(), run()
+    frames = short.grains()
+    short.grains = lambda: frames[: len(frames) // 2]
+    small.parameters["tank_length"] = 3.0
+    for one in (small, short):
+        found = judged("dam_break", dam.measure([one]))["front_at_3"]
+        assert (found["verdict"], found["value"]) == ("info", None) and "T = 3" in found["reason"]
+    assert verdicts()["front_at_3"]["value"] == pytest.approx(3.9, abs=0.3)
+    found = study(apart=np.nan)["front_converged"]
+    assert found["verdict"] == "info" and "no front" in found["reason"]
 
 
 def test_a_front_that_does_not_get_there_fails() -> None:

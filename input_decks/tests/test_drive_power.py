@@ -50,7 +50,8 @@ def shaken(real: float = 2.0, stated: float | None = None, **changes: Any) -> An
     kinetic, fallen = 0.5 * motion**2, -g * height
     table: dict[str, Any] = {"step": np.arange(len(time)), "time": time, "kinetic_energy": kinetic, "gravity": fallen, "walls": work,
                              "normal_viscous": kinetic - fallen - work, "plate_fz": force, "plate_work": work, "weight_height": g * height}
-    zero = ["first_kinetic", "normal_elastic", "tangential_elastic", "tangential_viscous", "normal_stored", "tangential_stored", "balance"]
+    zero = ["first_kinetic", "normal_elastic", "tangential_elastic", "tangential_viscous", "normal_stored", "tangential_stored", "balance",
+            "capillary", "liquid_viscous"]
     table |= {name: np.zeros(len(time)) for name in zero} | {"scale": np.full(len(time), 2.0 * work[-1])}
     rows = {name: np.asarray(values[10::10]) for name, values in table.items()}
     grain = SimpleNamespace(step=(STILL + RAMP) * fine, masses=np.ones(1))
@@ -139,6 +140,16 @@ def test_a_known_motion_is_measured_as_it_is(acceleration: float) -> None:
 @pytest.mark.parametrize("factors", [{"kinetic_energy": 1.001}, {"walls": np.nan}])
 def test_wrong_energies_fail(factors: dict[str, float]) -> None:
     assert "energy_balance" in names(verdicts(spoiled(**factors)), "fail")
+
+
+def test_bridges_take_their_part_of_the_energy_and_have_no_block() -> None:
+    run = shaken(bridge_volume=8e-11)
+    rows = run.times()
+    rows |= {"normal_viscous": 0.7 * rows["normal_viscous"], "liquid_viscous": 0.2 * rows["normal_viscous"],
+             "capillary": 0.1 * rows["normal_viscous"]}
+    found = verdicts(run)
+    assert {"energy_balance", "dissipation_gap"} <= names(found, "pass"), found
+    assert found["power"]["reference"] is None and found["flight"]["reference"] is None
 
 
 def test_power_and_dissipation_are_compared_in_the_mean_over_runs() -> None:

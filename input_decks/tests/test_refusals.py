@@ -23,6 +23,9 @@ from dembark.validation.case.resolve import resolve
     # Walls and cubes of particles end where their lattice does.
     ("dam_break_cubes", {"spacing": 0.03, "slit_pressure": 0.0, "courant": 0.36}, "column_height must be a multiple"),
     ("dam_break_cubes", {"spacing": 0.02, "slit_pressure": 0.0}, "edge must be a multiple"),
+    *((case, {"motion_second_amplitude": 1e-3}, "motion_second_amplitude must be 0") for case in ("drive_power", "vibro_mixing")),
+    *((case, {"grain_diameter_spread": 0.2}, "grain_diameter_spread must be 0")
+      for case in ("bead_chain", "compressed_chain", "moving_walls")),
     ("drive_power", {"time_step_fraction": 0.3}, "lower time_step_fraction"),
     ("drive_power", {"cell_width": 0.015}, "must be at least 4 grain_diameter"),
     ("drive_power", {"motion": "circular"}, "shake up and down"), ("drive_power", {"motion_amplitude": 0.002}, "not motion_amplitude"),

@@ -147,6 +147,13 @@ def test_of_changed_layers_the_onset_is_not_judged(change: dict[str, Any]) -> No
     assert sweep(2.5, **change)["order_onset"]["reference"] is None
 
 
+@pytest.mark.parametrize("change", [{"motion_second_amplitude": 1e-3}, {"spins": "blocked"}, {"static_friction": 0.0}])
+def test_of_changed_layers_neither_waves_nor_a_flat_surface_are_asked(change: dict[str, Any]) -> None:
+    waves = verdicts(part=1.0, motion_frequency=FAST, **change)["strongest_frequency"]
+    flat = verdicts(lambda _: 0.3, noise=0.1, motion_gamma=1.5, **change)["flat_peak"]
+    assert waves["verdict"] == flat["verdict"] == "info" and "one frequency" in waves["reason"] and waves["tolerance"] is None
+
+
 def study(name: str, along: str, **found: tuple[float, dict[str, Any]]) -> dict[str, Any]:
     """The study `name` of results by variant: (value of its quantity, parameters)."""
     quantity = "onset" if name == "changes" else "wavelength"
@@ -240,7 +247,7 @@ def controls_vibrated_layer(_folder: Path) -> Iterator[Control]:
     yield Control("waves on a layer that should be flat", verdicts(lambda _: 0.0, noise=0.1, motion_gamma=1.5),
                   verdicts(lambda _: 0.3, noise=0.1, motion_gamma=1.5))
     yield Control("a surface that answers each stroke alike", waves, verdicts(part=1.0, motion_frequency=FAST))
-    yield Control("ordered waves that begin at the acceleration of free fall and a half", sweep(2.5), sweep(2.0))
+    yield Control("ordered waves that begin at twice the acceleration of free fall", sweep(2.5), sweep(2.0))
     yield Control("waves twice as long, at another part of the frequency, than published", panel(5, 0.5), panel(2, 0.25))
     yield Control("one wave on any length", lengths(12.5, 12.5, 14.3), lengths(12.5, 18.75, 25.0))
     yield Control("changes that change nothing", shifts(sweep_smooth=-0.2), shifts())

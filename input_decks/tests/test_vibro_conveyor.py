@@ -88,15 +88,17 @@ def parameters(variant: str) -> dict[str, Any]:
     return defaults("vibro_conveyor") | dict(portable(resolve(find("vibro_conveyor"), None, variant, {})))
 
 
-def run(variant: str = "throws", speed: float | None = None, booked: float = 1.0) -> Any:
-    """A body that travels with this speed (m/s; that of the block if it is not given) and an account of which a part is booked."""
-    p = parameters(variant)
+def run(variant: str = "throws", speed: float | None = None, booked: float = 1.0, wet: float = 0.0, **changes: Any) -> Any:
+    """A body that travels with this speed (m/s; that of the block if it is not given) and an account of which a part is booked; liquid does
+    the part `wet` of the work."""
+    p = parameters(variant) | changes
     period = 1.0 / p["motion_frequency"]
     own = conveyor.expected(p) * conveyor.plate_speed(p) if speed is None else speed
     frames = [frame_of([[own * k * period / 8, 0.0, 0.0025]], 0.0025, step=100 * k) for k in range(8 * p["periods"] + 1)]
     table: dict[str, Any] = {name: np.zeros(9) for name in (
         "first_kinetic", "normal_elastic", "tangential_elastic", "tangential_viscous", "walls", "gravity", "balance")}
-    table |= {"step": 100 * np.arange(9), "kinetic_energy": np.full(9, 1.0), "normal_viscous": np.full(9, booked), "scale": np.full(9, 2.0),
+    table |= {"step": 100 * np.arange(9), "kinetic_energy": np.full(9, 1.0), "normal_viscous": np.full(9, booked - wet),
+              "capillary": np.full(9, 0.7 * wet), "liquid_viscous": np.full(9, 0.3 * wet), "scale": np.full(9, 2.0),
               "plate_fz": np.array([0.0, 1.0] * 4 + [1.0])}
     return SimpleNamespace(parameters=p, derived={}, time_step=period / 800, grains=lambda: frames, times=lambda: table, folder=Path("run"))
 
@@ -113,6 +115,25 @@ def studied(friction: float = 1.0, sign: float = 1.0) -> Any:
         found = conveyor.expected(p | {"static_friction": friction * p["static_friction"]})
         points.append(point(p, {"transport_speed": sign * found}, None))
     return judged("vibro_conveyor", conveyor.study("throw", points, "motion_gamma"))
+
+
+@pytest.mark.parametrize(("throw", "restitution"), [(2.0, 0.5), (3.0, 0.3), (1.5, 0.7)])
+def test_a_block_that_bounces_irregularly_has_no_expected_speed(throw: float, restitution: float) -> None:
+    changes = {"motion_gamma": throw, "restitution": restitution}
+    found = verdicts(**changes)["transport_speed"]
+    assert found["verdict"] == "info" and "differ by" in found["reason"]
+    points = [point(parameters(variant) | {"restitution": restitution}, {"transport_speed": 0.3}, None)
+              for variant in ("g15", "throws", "g3")]
+    assert judged("vibro_conveyor", conveyor.study("throw", points, "motion_gamma"))["speed_rise"]["verdict"] == "info"
+
+
+@pytest.mark.parametrize("variant", ["slides", "g04", "g11", "g15", "throws", "g25", "g3"])
+def test_the_blocks_of_the_study_repeat_themselves(variant: str) -> None:
+    assert not conveyor.irregular(parameters(variant))
+
+
+def test_the_work_of_bridges_is_in_the_balance() -> None:
+    assert "energy_balance" in names(verdicts(wet=0.3, bridge_volume=8e-11), "pass")
 
 
 def test_the_right_transport_passes() -> None:

@@ -15,7 +15,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from dembark.common.errors import DembarkError
-from dembark.input_decks.common.momentum import CONTACT_PARTS
+from dembark.input_decks.common.momentum import BRIDGED_PARTS
 from dembark.input_decks.common.part_impacts import own_modulus
 from dembark.input_decks.common.setup import friction, liquid
 from dembark.input_decks.common.trough import sites_within
@@ -39,11 +39,12 @@ hits_of_ball = cache(lambda lost=0: hits_on_part(BALL, lost=lost).record)
 GRAIN = {"part_diameter": 0.005, "part_density": 2500.0}
 
 
-def account(rows: dict[str, Any], booked: float = 1.0) -> dict[str, Any]:
-    """Energies whose works balance, but for the part of the damping that is not `booked`."""
+def account(rows: dict[str, Any], booked: float = 1.0, wet: float = 0.0) -> dict[str, Any]:
+    """Energies whose works balance, but for the part of the damping that is not `booked`; liquid does the part `wet` of it."""
     time = rows["time"]
-    table = dict.fromkeys(("first_kinetic", "gravity", *CONTACT_PARTS, "balance"), 0.0 * time)
-    table |= {"walls": 2.0 * time, "normal_viscous": -1.5 * booked * time, "kinetic_energy": 0.5 * time, "scale": 4.0 * time + 1.0}
+    table = dict.fromkeys(("first_kinetic", "gravity", *BRIDGED_PARTS, "balance"), 0.0 * time)
+    table |= {"walls": 2.0 * time, "normal_viscous": -1.5 * (booked - wet) * time, "liquid_viscous": -1.0 * wet * time,
+              "capillary": -0.5 * wet * time, "kinetic_energy": 0.5 * time, "scale": 4.0 * time + 1.0}
     return rows | table
 
 
@@ -58,10 +59,11 @@ def of_contacts(parameters: dict[str, Any]) -> dict[str, Any]:
     return {**friction(p), **liquid(p)}
 
 
-def measured(run: Trough, booked: float = 1.0, hits: FreeRecord | None = None, **parameters: Any) -> dict[str, Any]:
+def measured(run: Trough, booked: float = 1.0, hits: FreeRecord | None = None, *, wet: float = 0.0,
+             **parameters: Any) -> dict[str, Any]:
     given = defaults("vibro_finishing", motion_frequency=12.5, **parameters)
     replica = Replica(Path(), {"parameters": given, "derived": of_contacts(given)})
-    replica.__dict__["_read"] = with_hits(replace(run, rows=account(dict(run.rows), booked)), hits or hits_of_ball())
+    replica.__dict__["_read"] = with_hits(replace(run, rows=account(dict(run.rows), booked, wet)), hits or hits_of_ball())
     return judged("vibro_finishing", finishing.measure([replica]))
 
 
@@ -94,6 +96,10 @@ def test_a_bed_that_turns_as_a_body(tmp_path: Path) -> None:
     assert found["circulation"]["value"] == pytest.approx(0.5 / omega, rel=0.05)
     assert found["revolution"]["value"] == pytest.approx(0.5 / omega, rel=0.1)
     assert found["power"]["value"] == pytest.approx(0.3)
+
+
+def test_the_work_of_bridges_is_in_the_balance(tmp_path: Path) -> None:
+    assert "energy_balance" in names(measured(trough(tmp_path), wet=0.3), "pass")
 
 
 def test_a_large_part_is_not_taken_for_a_grain(tmp_path: Path) -> None:

@@ -98,10 +98,11 @@ def thrown(folder: Path, **changes: Any) -> dict[str, Any]:
     return judged("vibro_hardening", hardening.thrown(throws(folder, **changes), parameters))
 
 
-def measured(folder: Path, booked: float = 1.0, lost: int = 0, *, lighter: float = 1.0, packings: int = 3) -> dict[str, Any]:
+def measured(folder: Path, booked: float = 1.0, lost: int = 0, *, lighter: float = 1.0, packings: int = 3,
+             wet: float = 0.0) -> dict[str, Any]:
     folder.mkdir(exist_ok=True)
     run, hits = trough(folder, part=False), record(folder, lost=lost)
-    rows = account(dict(run.rows), booked)
+    rows = account(dict(run.rows), booked, wet)
     share = rows["time"] / rows["time"][-1]
     both = 60 * MASS * 2.0 * SPEED
     rows |= {"part_work": 0.0 * share, "part_jx": -0.2 * both * share, "part_jy": 0.0 * share, "part_jz": both * share}
@@ -175,6 +176,10 @@ def test_peaks_belong_to_their_impacts_when_grains_take_turns(tmp_path: Path) ->
     still = SimpleNamespace(displacement=lambda t: np.zeros((len(t), 3)), velocity=lambda t: np.zeros((len(t), 3)))
     hits = read_record(tmp_path / "touches.dump", still, SQUARE, stride=2, time_step=STEP, first=0, periods=1, period=1e-3, depth=DEPTH)
     np.testing.assert_array_equal(np.sort(hits.peaks()), [3.0, 5.0, 9.0])
+
+
+def test_the_work_of_bridges_is_in_the_balance(tmp_path: Path) -> None:
+    assert "energy_balance" in names(measured(tmp_path / "wet", wet=0.3), "pass")
 
 
 def test_lone_impacts_of_elastic_grains_are_those_of_hertz() -> None:

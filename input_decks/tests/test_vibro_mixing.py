@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from dembark.input_decks.common.momentum import unexplained_energy
+from dembark.input_decks.common.setup import friction
 from dembark.input_decks.common.vibration import PHASES
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.validation.case import deck
@@ -48,8 +49,8 @@ def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: fl
         one.select = lambda _, same=one: same
         frames.append(one)
     rows = {name: np.zeros(300) for name in ("other", "imposed")} | {"balance": np.full(300, lost), "scale": np.ones(300)}
-    return SimpleNamespace(folder="run", parameters=given, derived={"period_steps": STRIDE * PHASES}, time_step=1e-4, grains=lambda: frames,
-                           times=lambda: rows)
+    derived = {"period_steps": STRIDE * PHASES, **friction(SimpleNamespace(**given))}
+    return SimpleNamespace(folder="run", parameters=given, derived=derived, time_step=1e-4, grains=lambda: frames, times=lambda: rows)
 
 
 def verdicts(packings: int = 1, **changes: Any) -> dict[str, Any]:
@@ -72,6 +73,12 @@ def test_grains_that_stay_do_not_mix() -> None:
     found = verdicts(swaps=0)
     assert found["index_sides"]["value"] < 0.1 and found["index_layers"]["value"] < 0.1
     assert "wall_drift_smooth" not in found
+
+
+def test_walls_are_smooth_by_the_friction_that_acts() -> None:
+    """A static_friction replaces that of the walls."""
+    assert "wall_drift_smooth" in verdicts(static_friction=0.0)
+    assert "wall_drift_smooth" not in verdicts(wall_friction=0.0, static_friction=0.5)
 
 
 def test_a_large_grain_rises_at_its_speed() -> None:

@@ -24,10 +24,10 @@ D, BELOW, COUNT = 0.005, -0.004, 240
 
 
 def screened(*, rate: float = 0.2, tiring: float = 0.0, through: int = 0, fallen: int = 0, lost: float = 0.0, width: float = 2.0,
-             seed: int = 0) -> Any:
+             seed: int = 0, **changes: Any) -> Any:
     """A run in which each undersize grain passes at random with a `rate` (1/period), which falls by the part `tiring` from period to
     period; `through`: oversize grains that pass; `fallen`: grains that are below the pan at the end."""
-    given = defaults("vibro_sieve")
+    given = defaults("vibro_sieve", **changes)
     random, oversize = np.random.default_rng(seed), np.arange(COUNT) < 24
     hazard = rate * (1.0 - tiring) ** np.arange(given["periods"])
     periods = np.concatenate([[0.0], np.cumsum(hazard)])
@@ -49,9 +49,9 @@ def verdicts(packings: int = 5, **changes: Any) -> dict[str, Any]:
     return judged("vibro_sieve", sieve.measure([screened(seed=seed, **changes) for seed in range(packings)]))
 
 
-def studied(*rates: float, half: float = 0.01) -> dict[str, Any]:
+def studied(*rates: float, half: float = 0.01, gamma: float = 3.0) -> dict[str, Any]:
     """Slots of three widths with these rates."""
-    points = [point(defaults("vibro_sieve", aperture=aperture), {"rate": rate}, half)
+    points = [point(defaults("vibro_sieve", aperture=aperture, motion_gamma=gamma), {"rate": rate}, half)
               for aperture, rate in zip((0.0055, 0.00625, 0.0075), rates, strict=True)]
     return judged("vibro_sieve", sieve.study("aperture", points, "aperture"))
 
@@ -91,6 +91,18 @@ def test_grains_on_top_of_each_other_are_not_asked_for_one_rate() -> None:
     found = verdicts(10, width=1.0, tiring=0.1)
     # 216 grains of 5 mm, 24 of 11 mm.
     assert found["coverage"]["value"] == pytest.approx(1.344) and found["order"]["verdict"] == "info" and "wait" in found["order"]["reason"]
+
+
+def test_a_screen_that_never_throws_is_asked_for_no_rate() -> None:
+    found = verdicts(10, motion_gamma=0.9) | studied(0.3, 0.2, 0.1, gamma=0.9)
+    for name in ("order", "chance", "rate_falls"):
+        assert found[name]["verdict"] == "info" and "stay where they lie" in found[name]["reason"], name
+
+
+def test_flights_longer_than_a_period_leave_the_chance_open() -> None:
+    found = verdicts(10, motion_gamma=4.0, rate=0.05)
+    assert found["chance"]["verdict"] == "info" and "more than a period" in found["chance"]["reason"]
+    assert verdicts(10, motion_gamma=3.2)["chance"]["verdict"] == "pass"
 
 
 def test_bars_and_slots_have_their_widths() -> None:

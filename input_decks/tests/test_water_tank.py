@@ -119,6 +119,24 @@ def test_a_narrow_slot_is_shown_and_not_judged() -> None:
     assert "slot_width" not in found and found["slot_error"]["verdict"] == "info"
 
 
+def test_a_slot_that_is_wide_against_the_tank_is_shown_and_not_judged() -> None:
+    one = run("slot")
+    one.parameters["size"], one.derived["half"] = 0.08, 0.04
+    found = judged("water_tank", tank.measure([one]))["slot_width"]
+    assert found["verdict"] == "info" and "up to 0.15" in found["reason"]
+    for variant in ("slot", "slot_5", "slot_8"):
+        p = resolve(find("water_tank"), variant=variant)
+        assert p["size"] <= tank.NARROW * p["tank_width"]
+
+
+@pytest.mark.parametrize("change", [{"body_density": 1500.0}, {"size": 0.03}, {"tank_width": 0.1}, {"gravity": 1.6}])
+def test_another_block_is_not_compared_with_the_one_of_the_experiment(change: dict[str, float]) -> None:
+    one = run("falling")
+    one.parameters |= change
+    found = judged("water_tank", tank.measure([one]))["fall_time"]
+    assert found["verdict"] == "info" and "the experiment had" in found["reason"]
+
+
 def potential(radius: float, width: float, height: float) -> float:
     """Added mass of the cylinder over the water displaced, from Laplace's equation: harmonics r^±n cos n θ, n odd, fitted to the normal
     velocities on the cylinder, cos θ, and on the box, none."""

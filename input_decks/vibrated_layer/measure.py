@@ -61,6 +61,11 @@ def plain(p: Numbers) -> bool:
             and p["grain_friction"] > 0.0 and p["static_friction"] is None)
 
 
+def changed(p: Numbers) -> str:
+    """Why what is known of plain layers cannot be asked of this one; "" where it can."""
+    return "" if plain(p) else "known for dry spheres that rub and turn, on a flat floor that shakes with one frequency"
+
+
 def measure(replicas: Replicas) -> Measurement:
     """Of one level its waves, of several the onset; profiles and the diagram of space and time of the first replica."""
     runs, p = [read(replica) for replica in replicas], replicas[0].parameters
@@ -96,7 +101,7 @@ def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
         "doubling_amplitude": Value(over(lambda waves: amplitude(waves.doubling_power()))),
     }
     if gamma <= FLAT:
-        return values | {"flat_peak": Value(exact(mean(Waves.peak)), exact(1.0))}
+        return values | {"flat_peak": Value(exact(mean(Waves.peak)), exact(1.0), inapplicable=changed(p))}
     lengths = over(Waves.wavelength)
     law = quoted_length(frequency * math.sqrt(height / p["gravity"]))
     values |= {"wavelength": Value(Estimate(lengths.value / d, lengths.half / d, lengths.basis)),
@@ -108,7 +113,7 @@ def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
     if WAVY[0] <= gamma <= WAVY[1]:
         # The run that is farthest off counts.
         found = max((one.waves[0].strongest() for one in runs), key=lambda value: abs(value - 0.5))
-        values["strongest_frequency"] = Value(exact(found), exact(0.5), inapplicable=slow(p, gamma))
+        values["strongest_frequency"] = Value(exact(found), exact(0.5), inapplicable=changed(p) or slow(p, gamma))
     return values
 
 

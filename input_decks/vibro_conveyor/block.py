@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 from scipy.optimize import brentq
 
@@ -19,15 +20,18 @@ from dembark.common.errors import DembarkError
 TURN = 2.0 * math.pi
 PIECE = TURN / 500.0  # in which functions are searched for roots
 REST = 1e-9  # speed relative to the plate that is none
+WINDOW = 20  # periods of a mean
 MOST = 100_000  # events in a period
 
 
 @dataclass(frozen=True)
 class Conveyed:
-    """Mean `speed` in g / w, and `flight`, the share of the time without contact."""
+    """Mean `speed` in g / w; `flight`, the share of the time without contact; `spread`, the largest difference (g / w) of its means over
+    WINDOW periods, 0 of a motion that repeats."""
 
     speed: float
     flight: float
+    spread: float
 
 
 def first_root(function: Callable[[float], float], start: float, end: float, piece: float = PIECE) -> float:
@@ -145,7 +149,11 @@ def conveyed(throw: float, angle: float, friction: float, restitution: float = 0
     block = Block(throw, cotangent, friction, restitution, v=throw * cotangent)
     for period in range(skip):
         block.advance(TURN * (period + 1))
-    x, flown = block.x, block.flown
+    x, flown, places = block.x, block.flown, [block.x]
     for period in range(skip, skip + periods):
         block.advance(TURN * (period + 1))
-    return Conveyed((block.x - x) / (TURN * periods), (block.flown - flown) / (TURN * periods))
+        if (period + 1 - skip) % WINDOW == 0:
+            places.append(block.x)
+    means = [(after - before) / (TURN * WINDOW) for before, after in pairwise(places)]
+    spread = max(means) - min(means) if means else 0.0
+    return Conveyed((block.x - x) / (TURN * periods), (block.flown - flown) / (TURN * periods), spread)

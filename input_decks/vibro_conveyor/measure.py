@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from dembark.input_decks.common.drive_levels import acceleration
-from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
+from dembark.input_decks.common.momentum import BRIDGED_PARTS, imbalance
 from dembark.input_decks.common.power_law import ordered
 from dembark.postproc.measurement import (
     Array,
@@ -24,21 +24,32 @@ from dembark.postproc.measurement import (
 from dembark.postproc.profiles import lagrangian_velocities
 from dembark.postproc.studies import measured
 
-from .block import conveyed
+from .block import WINDOW, Conveyed, conveyed
 
 # Force on the plate over the weight that is none.
 NONE = 1e-3
+# Largest part by which means of the block's motion may differ for its speed to count as known.
+STEADY = 0.01
 
 
-@cache
-def block_speed(throw: float, angle: float, friction: float, restitution: float) -> float:
-    """Mean speed of a block over the largest horizontal speed of the plate."""
-    return conveyed(throw, angle, friction, restitution).speed * math.tan(angle) / throw
+block_on_plate = cache(conveyed)
+
+
+def block(p: Numbers) -> Conveyed:
+    """The motion of a block with the parameters of a run."""
+    return block_on_plate(acceleration(p), p["throw_angle"], p["static_friction"], p["restitution"])
 
 
 def expected(p: Numbers) -> float:
-    """That of a block with the parameters of a run."""
-    return block_speed(acceleration(p), p["throw_angle"], p["static_friction"], p["restitution"])
+    """Its mean speed over the largest horizontal speed of the plate."""
+    return block(p).speed * math.tan(p["throw_angle"]) / acceleration(p)
+
+
+def irregular(p: Numbers) -> str:
+    """Why no speed is expected of a block that bounces without repeating itself; "" of one that does."""
+    found = block(p)
+    part = found.spread / abs(found.speed) if found.spread > 1e-9 else 0.0
+    return f"a block with this restitution moves irregularly: its means over {WINDOW} periods differ by {part:.1%}" if part > STEADY else ""
 
 
 def coulomb(p: Numbers) -> bool:
@@ -84,11 +95,11 @@ def measure(replicas: Replicas) -> Measurement:
     speed = exact(means[0]) if single else over_replicas([Estimate(mean, math.inf, "one packing") for mean in means])
     ratio = Estimate(speed.value / scale, speed.half / scale, speed.basis)
     still, theory = single and slips_nowhere(p), expected(p)
-    block = single and p["spin"] == "blocked" and coulomb(p)
+    like_it = single and p["spin"] == "blocked" and coulomb(p)
     values = {
-        "energy_balance": Value(exact(max(imbalance(run.times(), CONTACT_PARTS) for run in replicas)), exact(0.0)),
+        "energy_balance": Value(exact(max(imbalance(run.times(), BRIDGED_PARTS) for run in replicas)), exact(0.0)),
         **({"rest_speed": Value(ratio, exact(0.0))} if still else
-           {"transport_speed": Value(ratio, exact(theory) if block else None)}),
+           {"transport_speed": Value(ratio, exact(theory) if like_it else None, inapplicable=irregular(p) if like_it else "")}),
         "flight": Value(exact(float(np.mean([flight(run) for run in replicas])))),
         "block_speed": Value(exact(theory)),
         "speed": Value(speed),
@@ -106,6 +117,7 @@ def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001
     due = np.array([expected(point["parameters"]) for point in points])
     scale = throw * p["gravity"] / (2.0 * math.pi * p["motion_frequency"]) / math.tan(p["throw_angle"])
     worst = float(np.abs((found - due) * scale).max() / np.abs(due * scale).max())
-    return Measurement({"speed_rise": Value(exact(worst), exact(0.0))}, [
+    unknown = next(filter(None, (irregular(point["parameters"]) for point in points)), "")
+    return Measurement({"speed_rise": Value(exact(worst), exact(0.0), inapplicable=unknown)}, [
         profile("speed", "Transport speed over the throw number", "throw number", "m/s", throw, [scale * found], reference=scale * due,
                 reference_label="block, from event to event")])

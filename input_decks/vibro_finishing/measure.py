@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from dembark.input_decks.common.estimates import divided, over_chaotic, ratio
-from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
+from dembark.input_decks.common.momentum import BRIDGED_PARTS, imbalance
 from dembark.input_decks.common.part_impacts import impact_measurement
 from dembark.input_decks.common.power_law import ordered
 from dembark.input_decks.common.vibratory_trough import Trough, drifts, numerical_changes, read, rigidity, spectra
@@ -35,7 +35,7 @@ def measure(replicas: Replicas) -> Measurement:
         "agitation": over(Trough.agitation),
     }
     if p["part"] == "sphere":
-        values["energy_balance"] = Value(exact(np.max([imbalance(one.rows, CONTACT_PARTS) for one in runs])), exact(0.0))
+        values["energy_balance"] = Value(exact(np.max([imbalance(one.rows, BRIDGED_PARTS) for one in runs])), exact(0.0))
     else:
         changes = [rigidity(list(one.grains()), int(one.derived["body_spheres"])) for one in replicas]
         values["rigidity"] = Value(exact(max(changes) / diameter), exact(0.0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from dembark.input_decks.common import vibratory_trough
 from dembark.input_decks.common.estimates import divided, over_chaotic, ratio
-from dembark.input_decks.common.momentum import CONTACT_PARTS, imbalance
+from dembark.input_decks.common.momentum import BRIDGED_PARTS, imbalance
 from dembark.input_decks.common.motion import motion
 from dembark.input_decks.common.part_impacts import impact_measurement, lone_impacts, own_modulus, volumes
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
@@ -60,7 +60,7 @@ def measure(replicas: Replicas) -> Measurement:
         return Value(over_chaotic(number(one) for one in runs))
 
     values = {
-        "energy_balance": Value(exact(np.max([imbalance(one.rows, CONTACT_PARTS) for one in runs])), exact(0.0)),
+        "energy_balance": Value(exact(np.max([imbalance(one.rows, BRIDGED_PARTS) for one in runs])), exact(0.0)),
         "touch_balance": Value(exact(max(impulse_gap(*pair) for pair in zip(runs, records, strict=True))), exact(0.0)),
         "friction_power": over([one.friction() for one in records]), "circulation": over([one.turning() for one in runs], drive),
         "power": over([one.power(*WALLS) for one in runs]), "noise": of_run(lambda one: one.noise("trough")),

@@ -40,7 +40,7 @@ def measure(replicas: Replicas) -> Measurement:
     values = {"energy_balance": Value(exact(max(unexplained_energy(replica.times()) for replica in replicas)), exact(0.0)),
               "acceleration": Value(exact(acceleration(p))),
               "wall_drift": Value(drift)}
-    if p["wall_friction"] == 0.0 and p["static_friction"] is None:
+    if replicas[0].derived["wall_static"] == 0.0:
         values["wall_drift_smooth"] = Value(drift, exact(0.0))
     elif acceleration(p) > 1.0:
         values["wall_drift"] = of_sign(drift, -1)

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.input_decks.common.drive_levels import acceleration
 from dembark.input_decks.common.drive_phases import read_phases
 from dembark.input_decks.common.estimates import over_chaotic, values_and_halves
 from dembark.input_decks.common.momentum import unexplained_energy
 from dembark.input_decks.common.power_law import ordered
+from dembark.input_decks.drive_power.drive import LONGEST
 from dembark.postproc.measurement import (
     Array,
     Estimate,
@@ -74,6 +76,18 @@ def random_chance(p: Numbers) -> float:
     return float((p["aperture"] - p["grain_diameter"]) / (p["aperture"] + p["bar_width"]))
 
 
+def resting(p: Numbers) -> str:
+    """Why nothing is known of passages where the screen never throws; "" where it does."""
+    return "" if acceleration(p) > 1.0 else "up to 1 g grains stay where they lie: they do not meet the screen anew"
+
+
+def meetings(p: Numbers) -> str:
+    """Why grains do not meet the screen once in each period; "" where they do. A body that does not bounce flies for a full one from
+    LONGEST on."""
+    longer = f"from {LONGEST:.2f} g on a flight lasts more than a period: grains meet the screen less than once in each"
+    return resting(p) or (longer if acceleration(p) >= LONGEST else "")
+
+
 def measure(replicas: Replicas) -> Measurement:
     """Values and curves from all packings."""
     p, runs = replicas[0].parameters, [read(replica) for replica in replicas]
@@ -84,7 +98,7 @@ def measure(replicas: Replicas) -> Measurement:
     coverage = over_chaotic(one.coverage for one in runs)
     order = over_chaotic(halves_ratio(one.on) for one in runs)
     # Fewer than three packings have no interval, without which the ratio decides nothing.
-    crowded = "grains lie on each other, and wait" if coverage.value > 1.0 else ""
+    crowded = "grains lie on each other, and wait" if coverage.value > 1.0 else resting(p)
     values = {
         "energy_balance": number(max(unexplained_energy(replica.times()) for replica in replicas), 0.0),
         "oversize_passed": number(sum(one.through for one in runs), 0.0),
@@ -94,7 +108,7 @@ def measure(replicas: Replicas) -> Measurement:
         "passed": Value(over_chaotic(1.0 - on[-1] / on[0] for on in counts)),
         "rate": Value(found),
         "order": Value(order, exact(1.0) if len(counts) > 2 and math.isfinite(order.value) else None, inapplicable=crowded),
-        "chance": above(chance, random_chance(p)),
+        "chance": above(chance, random_chance(p), meetings(p)),
     }
     time = np.arange(len(counts[0]), dtype=float)
     return Measurement(values, [profile("passed", "Undersize that has passed", "periods", "part of that on the screen at the start", time,
@@ -102,8 +116,10 @@ def measure(replicas: Replicas) -> Measurement:
                                         reference_label="first order, with the rate k")])
 
 
-def above(found: Estimate, bound: float) -> Value:
+def above(found: Estimate, bound: float, inapplicable: str) -> Value:
     """`found` next to a lower `bound`: open where its interval holds the bound."""
+    if inapplicable:
+        return Value(found, exact(bound), inapplicable=inapplicable)
     if abs(found.value - bound) <= found.half:
         return Value(found, exact(bound), reason="its interval holds the bound")
     return Value(found, exact(bound), verdict="pass" if found.value > bound else "fail")
@@ -115,7 +131,9 @@ def study(name: str, points: Points, along: str) -> Measurement:  # noqa: ARG001
     rates, halves = values_and_halves([measured(point, "rate") for point in points])
     steps, wide = np.diff(rates), np.hypot(halves[1:], halves[:-1])
     risen, fallen = steps > wide, steps < -wide
-    if fallen.any() or risen.all():
+    if still := resting(points[0]["parameters"]):
+        falls = number(float(risen.sum()), float(len(steps)), inapplicable=still)
+    elif fallen.any() or risen.all():
         falls = number(float(risen.sum()), float(len(steps)), verdict="fail" if fallen.any() else "pass")
     else:
         falls = number(float(risen.sum()), float(len(steps)), reason="the interval of a step holds 0")

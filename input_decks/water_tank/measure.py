@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dembark.input_decks.common.estimates import reference_rows
+from dembark.input_decks.common.estimates import reference_rows, unlike
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.common.water_run import common_values, pressure
 from dembark.postproc.history import reached
@@ -15,9 +15,11 @@ from dembark.postproc.studies import measured
 # m, of the experiment with the falling block: the level, and the places below it between which it is timed.
 REFERENCE, LEVEL, PASSED = Path(__file__).with_name("reference") / "falling.csv", 0.131, (0.011, 0.081)
 # Of a jet behind a thin plate (Kirchhoff 1869).
+# Tank and block of that experiment.
+FALLING = {"size": 0.02, "tank_width": 0.15, "water_depth": 0.131, "body_density": 2120.0, "fluid_density": 1000.0, "gravity": 9.81}
 CONTRACTION = math.pi / (math.pi + 2.0)
-# The least width of a slot, over the spacing, that is judged.
-RESOLVED = 4
+# The least width of a slot, over the spacing, that is judged; the largest, over that of the tank, of which the contraction is the limit.
+RESOLVED, NARROW = 4, 0.15
 # Of its momentum, what a block must give to the water for the sum of both to count.
 FELT = 0.01
 
@@ -73,7 +75,8 @@ def falling(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
     seen = (times > 0.0) & (times <= own_t[-1])
     shown = profile("fall", "Falling block", "t / s", "height above the level / m", times[seen], [np.interp(times[seen], own_t, own_y)],
                     reference=below[seen], reference_label="experiment in Qiu et al. (2017)")
-    return {"fall_time": Value(exact(found), exact(between(times, below)), reason="" if found > 0.0 else "the run ends before")}, [shown]
+    return {"fall_time": Value(exact(found), exact(between(times, below)), reason="" if found > 0.0 else "the run ends before",
+                               inapplicable=unlike(run.parameters, FALLING))}, [shown]
 
 
 def added_mass(radius: float, width: float, height: float) -> float:
@@ -112,7 +115,8 @@ def slot(run: Replica) -> tuple[dict[str, Value], list[Curve]]:
     error = width - p["size"]
     values = {"slot_error": Value(exact(error / p["size"]))}
     if p["across"] >= RESOLVED:
-        values["slot_width"] = Value(exact(error / d["spacing"]), exact(0.0))
+        wide = f"the contraction is that of slots up to {NARROW:g} of the tank's width" if p["size"] > NARROW * d["tank_right"] else ""
+        values["slot_width"] = Value(exact(error / d["spacing"]), exact(0.0), inapplicable=wide)
     start = out[chosen][0] - due[chosen][0] * p["size"]
     return values, [profile("flow", "Water that has flown out", "t / s", "V / m²", times[chosen], [out[chosen]],
                             reference=start + due[chosen] * p["size"], reference_label="contraction 0.611")]
