@@ -39,7 +39,7 @@ FRACTIONS = {0.0: 0.639, 0.3: 0.593}
 @dataclass(frozen=True, eq=False)
 class Loading:
     """Frames of a test (frames,): the load in Pa, the normal stresses of the contacts inside along z and across in Pa, solid fraction,
-    contacts of a grain without bridges over gaps, and the compression ln(h0/h) of the layer since the load began to rise; `peak`: number
+    contacts of a grain without bridges over gaps, and the compression ln(h0/h) of the layer since the first frame; `peak`: number
     of the last frame of loading, `fall`: of the last one before the load falls; forces on both plates over the load (rows,)."""
 
     load: Array
