@@ -17,8 +17,9 @@ from dembark.postproc.studies import measured
 
 from .slope_flow import Slope, front_law, layers, mean_power
 
-# Inclinations (rad) up to which a bed on the chute shall be at rest, and up to which it flows slowly.
-REST, SLOW = 0.25, 0.36
+# Inclinations (rad) up to which a bed on the chute shall be at rest, up to which it flows slowly, and from which on it flows well above its
+# angle of repose. Between the last two the source has no power.
+REST, SLOW, FAST = 0.25, 0.30, 0.40
 
 
 def slope(replica: Replica) -> Slope:
@@ -186,7 +187,10 @@ def _chute(replicas: Replicas) -> Measurement:
     if p["slope_angle"] <= REST:
         values["rest_speed"] = Value(exact(max(abs(one.value) for one in means)), exact(0.0))
     else:
-        values["profile_power"] = Value(over_replicas(powers), exact(1.0 if p["slope_angle"] <= SLOW else 1.5))
+        angle, speed = p["slope_angle"], values["mean_speed"].estimate
+        between = f"the power is known up to {SLOW:g} rad and from {FAST:g} rad on" if SLOW < angle < FAST else ""
+        still = "" if abs(speed.value) > speed.half else "the mean speed is not above its interval"
+        values["profile_power"] = Value(over_replicas(powers), exact(1.0 if angle <= SLOW else 1.5), inapplicable=between or still)
     return Measurement(values, curves)
 
 

@@ -23,6 +23,8 @@ WET = {"liquid_viscous": "Dissipated in the viscous liquid", "capillary": "Work 
 DISSIPATING = ("normal_viscous", "tangential_viscous", "liquid_viscous")
 # Share of the mass behind the front: single grains roll on after the others have come to rest.
 FRONT = 0.98
+# Kinetic energy when the gate begins to move, over the potential energy lost from then on, below which the column counts as at rest.
+REST = 0.01
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,10 @@ class Collapse:
     def fallen(self) -> float:
         """J."""
         return float(-self.gain("potential_energy")[-1])
+
+    def rests(self) -> bool:
+        """Whether the grains are at rest when the gate begins to move."""
+        return bool(self.rows["kinetic_energy"][self.opening] < REST * self.fallen)
 
     def lost_in(self, name: str) -> Array:
         """Share that this way has taken since the opening."""
@@ -111,34 +117,39 @@ def measure(replicas: Replicas) -> Measurement:
     """Values, curves and remarks from all replicas of a series."""
     runs = [read(replica) for replica in replicas]
     ways = WAYS | (WET if replicas[0].parameters["bridge_volume"] > 0.0 else {})
+    resting = all(one.rests() for one in runs)
+    raining = "" if resting else "the grains still move when the gate opens: raise settle_time"
 
     def over(number: Callable[[Collapse], float]) -> Estimate:
         return over_chaotic(number(one) for one in runs)
 
+    def value(number: Callable[[Collapse], float]) -> Value:
+        return Value(over(number), reason=raining, compared=resting)
+
     def share(name: str) -> Value:
-        return Value(over(lambda one: float(one.lost_in(name)[-1])))
+        return value(lambda one: float(one.lost_in(name)[-1]))
 
     def worst(number: Callable[[Collapse], float]) -> Value:
         return Value(exact(np.max([number(one) for one in runs])), exact(0.0))  # of numbers that are none: none
 
     def with_law(number: Callable[[Collapse], float], law: float | None) -> Value:
         other = "the experiments used sand, sugar and rice between side walls, not rolling spheres"
-        return Value(over(number), None if law is None else exact(law), reason="" if law is None else other)
+        return Value(over(number), None if law is None else exact(law), reason=raining or ("" if law is None else other))
 
     aspect = over(lambda one: height(one.first) / one.width)
     values = {
         "energy_balance": worst(lambda one: momentum.imbalance(one.rows, momentum.BRIDGED_PARTS)),
         "potential_error": worst(Collapse.potential_error),
         "dissipation_sign": worst(Collapse.given_back),
-        "step_error": Value(over(lambda one: float(np.abs(one.gain("step_error")).max() / one.fallen))),
+        "step_error": value(lambda one: float(np.abs(one.gain("step_error")).max() / one.fallen)),
         "height_error": Value(over(lambda one: one.potential_error("weight_height"))),
         **{f"{name}_share": share(name) for name in ways},
-        "aspect_ratio": Value(aspect),
+        "aspect_ratio": Value(aspect, reason=raining, compared=resting),
         "run_out": with_law(lambda one: one.front() / one.width - 1.0, run_out_law(aspect.value)),
         "final_height": with_law(lambda one: float(surface(one.last, np.array([0.0, 2.0 * one.diameter]))[0]) / one.width,
                                  height_law(aspect.value)),
-        "mean_run_out": Value(over(lambda one: 2.0 * one.centre()[0] / one.width - 1.0)),
-        "mean_height": Value(over(lambda one: 2.0 * one.centre()[2] / one.width)),
+        "mean_run_out": value(lambda one: 2.0 * one.centre()[0] / one.width - 1.0),
+        "mean_height": value(lambda one: 2.0 * one.centre()[2] / one.width),
     }
     fallen, turned = 1e3 * np.mean([(one.fallen, one.rows["scale"][-1]) for one in runs], axis=0)
     remarks = [f"The collapse loses {fallen:.4g} mJ of potential energy; the total work of the run, with the rain, is {turned:.4g} mJ."]

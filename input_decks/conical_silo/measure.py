@@ -21,7 +21,8 @@ PUBLISHED = Path(__file__).with_name("reference") / "remaining.csv"
 SLOPES, LEVELS = ("musen", "liggghts", "peclet_hertz"), ("musen", "peclet_hertz")
 # What makes a run one of the published silo, whatever its modulus is.
 LARGE = {"grain_count": 100000, "grain_diameter": 0.004, "grain_density": 2500.0, "restitution": 0.5, "friction": 0.3,
-         "grain_steel_friction": 0.2, "grain_steel_restitution": 0.4, "barrel_radius": 0.1, "lip_radius": 0.03, "gravity": 9.81}
+         "grain_steel_friction": 0.2, "grain_steel_restitution": 0.4, "barrel_radius": 0.1, "lip_radius": 0.03, "sides": 100,
+         "gravity": 9.81}
 # Window of the slope (s) there, and parts of the grains that are left in that of other silos. Beverloo's constants for spheres.
 WINDOW, LEFT = (0.5, 3.5), (0.85, 0.3)
 C, K, POWER = 0.58, 1.4, 2.5

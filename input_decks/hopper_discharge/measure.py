@@ -24,9 +24,11 @@ CHOI = 1.48
 # 95 % limits of a digitised point: the largest difference of two digitisations.
 READ = 0.0035
 TITLES = ("Discharged mass", "time since 10 % discharged (s)", "fraction of the mass of all grains")
-# What makes a run one of the published bin.
-ANAND = {"grain_count": 6790, "grain_diameter": 0.00224, "bin_width": 0.12544, "bin_depth": 0.0056, "outlet_width": 0.025088,
-         "ends": "periodic"}
+# What makes a run one of the published bin, whatever its modulus and its resistance against rolling are, and the range of its frictions.
+ANAND = {"grain_count": 6790, "grain_diameter": 0.00224, "grain_diameter_spread": 0.0, "grain_density": 2500.0, "restitution": 0.94,
+         "wall_restitution": 0.9, "static_friction": None, "kinetic_friction": None, "kinetic_friction_ratio": 1.0, "bridge_volume": 0.0,
+         "bin_width": 0.12544, "bin_depth": 0.0056, "outlet_width": 0.025088, "ends": "periodic", "gravity": 9.81}
+FRICTIONS = (0.18, 0.22)
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,7 @@ def measure(replicas: Replicas) -> Measurement:
     """Values and the curve of all replicas of a series."""
     runs, given = [read(replica) for replica in replicas], replicas[0].parameters
     known = all(given[name] == value for name, value in ANAND.items())
+    known = known and all(FRICTIONS[0] <= given[name] <= FRICTIONS[1] for name in ("grain_friction", "wall_friction"))
     rate, last = over_replicas([run.rate() for run in runs]), over_replicas([_whole(float(run.share[-1]), run) for run in runs])
     rates = [Estimate(run.mass_rate(), run.rate().half / run.rate().value * run.mass_rate(), run.rate().basis) for run in runs]
     values = {"rate": Value(rate), "discharged": Value(last), "mass_rate": Value(over_replicas(rates)),

@@ -114,25 +114,31 @@ def measure(replicas: Replicas) -> Measurement:
     lasts = [ends(replica)[-1] for replica in replicas]
     heaps, errors = [heap(last, d) for last in lasts], np.abs([balances(replica) for replica in replicas])
     moving = "" if all(at_rest(last, p["gravity"], d) for last in lasts) else "the grains still move"
+    resting = all(at_rest(ends(replica)[0], p["gravity"], d) for replica in replicas)
+    raining = "" if resting else "the grains still move when the lift begins: raise settle_time"
     angle = over_chaotic(one.angle for one in heaps)
     values = {"off_plate": Value(exact(float(max(map(off_plate, replicas)))), exact(0.0)),
               "weight_error": Value(exact(errors[:, 0].max()), exact(0.0), inapplicable=moving),
               "impulse_error": Value(exact(errors[:, 1].max()), exact(0.0))}
     if replicas[0].derived["grain_static"] == 0.0:
         return Measurement(values | {"level_angle": Value(angle, exact(0.0))}, [_surface(replicas)])
-    values |= {"angle": Value(angle, reason=moving), "heap_height": Value(over_chaotic(one.height / d for one in heaps)),
-               "base_radius": Value(over_chaotic(one.base / d for one in heaps))}
+    values |= {"angle": Value(angle, reason=moving or raining, compared=resting),
+               "heap_height": Value(over_chaotic(one.height / d for one in heaps), reason=raining, compared=resting),
+               "base_radius": Value(over_chaotic(one.base / d for one in heaps), reason=raining, compared=resting)}
     columns = [height(ends(replica)[0]) for replica in replicas]
     if replicas[0].derived["lift_time"] < RELEASED * math.sqrt(np.mean(columns) / p["gravity"]):
         aspect = over_chaotic(one / radius for one in columns)
         run_out, deposit = over_chaotic(one.base / radius - 1.0 for one in heaps), over_chaotic(one.height / radius for one in heaps)
         known = np.array([(row.number("aspect_ratio"), row.number("run_out")) for row in reference_rows(CODE)])
         outside = "" if 0.95 <= aspect.value <= known[-1, 0] else f"the other code has columns of H/R from 1 to 3, not {aspect.value:.3g}"
-        values |= {"aspect_ratio_measured": Value(aspect), "run_out": Value(run_out),
-                   "run_out_of_code": Value(run_out, exact(float(np.interp(aspect.value, *known.T))), reason=moving, inapplicable=outside),
-                   "height_of_code": Value(deposit, CODE_HEIGHT, reason=moving, inapplicable=outside),
-                   "run_out_of_columns": Value(run_out, exact(run_out_of_columns(aspect.value)), reason=moving),
-                   "height_of_columns": Value(deposit, exact(height_of_columns(aspect.value)), reason=moving)}
+        open_for = moving or raining
+        values |= {"aspect_ratio_measured": Value(aspect, reason=raining, compared=resting),
+                   "run_out": Value(run_out, reason=raining, compared=resting),
+                   "run_out_of_code": Value(run_out, exact(float(np.interp(aspect.value, *known.T))), reason=open_for,
+                                            inapplicable=outside),
+                   "height_of_code": Value(deposit, CODE_HEIGHT, reason=open_for, inapplicable=outside),
+                   "run_out_of_columns": Value(run_out, exact(run_out_of_columns(aspect.value)), reason=open_for),
+                   "height_of_columns": Value(deposit, exact(height_of_columns(aspect.value)), reason=open_for)}
     return Measurement(values, [_surface(replicas)])
 
 

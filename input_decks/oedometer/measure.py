@@ -39,8 +39,8 @@ FRACTIONS = {0.0: 0.639, 0.3: 0.593}
 @dataclass(frozen=True, eq=False)
 class Loading:
     """Frames of a test (frames,): the load in Pa, the normal stresses of the contacts inside along z and across in Pa, solid fraction,
-    contacts of a grain, and the compression ln(h0/h) of the layer since the load began to rise; `peak`: number of the last frame of
-    loading, `fall`: of the last one before the load falls; forces on both plates over the load (rows,)."""
+    contacts of a grain without bridges over gaps, and the compression ln(h0/h) of the layer since the first frame; `peak`: number
+    of the last frame of loading, `fall`: of the last one before the load falls; forces on both plates over the load (rows,)."""
 
     load: Array
     along: Array
@@ -72,7 +72,7 @@ def read(replica: Replica) -> Loading:
     due = load(rows["step"][now] - 0.5 * numbers["every"]) * numbers["area"]
     stress = np.array([one.stress for one in found])
     return Loading(load(steps), stress[:, 2, 2], 0.5 * (stress[:, 0, 0] + stress[:, 1, 1]), np.array([one.fraction for one in found]),
-                   np.array([one.coordination for one in found]), np.log(height[0] / height), int(np.argmax(steps >= numbers["peak_step"])),
+                   np.array([one.touching for one in found]), np.log(height[0] / height), int(np.argmax(steps >= numbers["peak_step"])),
                    int(np.argmax(steps >= numbers["fall_step"])), rows["lower_fz"][now] / due, -rows["upper_fz"][now] / due)
 
 
@@ -99,6 +99,11 @@ def moduli(test: Loading, p: Numbers) -> tuple[float, float]:
     return float(slope), float(affine_modulus(np.asarray(pressure), np.asarray(density), p))
 
 
+def of_packing(value: float) -> Estimate:
+    """A number of one run, which depends on its packing."""
+    return Estimate(value, math.inf, "one packing does not show its spread")
+
+
 def estimates(replica: Replica) -> dict[str, Estimate]:
     """All that is measured of one run."""
     p, test = replica.parameters, read(replica)
@@ -108,13 +113,13 @@ def estimates(replica: Replica) -> dict[str, Estimate]:
     slope, affine = moduli(test, p)
     return {
         "k0": block_mean(ratio[loading]),
-        "k0_unloaded": exact(float(ratio[-1])),
-        "compression": exact(float(test.strain[test.fall])),
-        "residual_compression": exact(float(test.strain[-1])),
-        "modulus": exact(slope),
-        "modulus_over_affine": exact(slope / affine),
-        "solid_fraction": exact(float(test.fraction[0])),
-        "coordination": exact(float(test.coordination[test.fall])),
+        "k0_unloaded": of_packing(float(ratio[-1])),
+        "compression": of_packing(float(test.strain[test.fall])),
+        "residual_compression": of_packing(float(test.strain[-1])),
+        "modulus": of_packing(slope),
+        "modulus_over_affine": of_packing(slope / affine),
+        "solid_fraction": of_packing(float(test.fraction[0])),
+        "coordination": of_packing(float(test.coordination[test.fall])),
         "normal_balance_error": max((block_mean(side - 1.0) for side in (test.lower, test.upper)), key=lambda one: abs(one.value)),
         "contact_stress_error": block_mean(test.along / test.load - 1.0),
     }
@@ -126,11 +131,12 @@ def measure(replicas: Replicas) -> Measurement:
     slippery = not replicas[0].derived["grain_static"]
     over = {name: pooled(found, name) for name in found[0]}
     values = {name: Value(one) for name, one in over.items()}
-    rearranged = "grains without friction, whose contacts have no tangential stiffness" if slippery else ""
-    values["k0"] = Value(over["k0"], exact(1.0 - math.sin(math.atan(BEADS))), inapplicable="grains without friction" if slippery else "")
+    wet = "liquid bridges" if p["bridge_volume"] > 0.0 else ""
+    rearranged = "grains without friction, whose contacts have no tangential stiffness" if slippery else wet
+    values["k0"] = Value(over["k0"], exact(1.0 - math.sin(math.atan(BEADS))), inapplicable="grains without friction" if slippery else wet)
     values["modulus_over_affine"] = Value(over["modulus_over_affine"], exact(1.0), inapplicable=rearranged)
     if p["grain_diameter_spread"] == 0.0 and (known := FRACTIONS.get(replicas[0].derived["grain_static"])) is not None:
-        values["solid_fraction"] = Value(over["solid_fraction"], exact(known))
+        values["solid_fraction"] = Value(over["solid_fraction"], exact(known), inapplicable=wet)
     for name in ("normal_balance_error", "contact_stress_error"):
         values[name] = Value(over[name], exact(0.0))
     return Measurement(values, curves(replicas))
@@ -152,10 +158,12 @@ def study(name: str, results: Points, along: str) -> Measurement:  # noqa: ARG00
     """How the modulus rises with the load."""
     results, octaves = ordered(results, along)
     stress = results[0]["parameters"]["normal_stress"] * 2.0**octaves
+    wet = "liquid bridges" if any(one["parameters"]["bridge_volume"] > 0.0 for one in results) else ""
     found: dict[str, Value] = {}
     for quantity, due in (("modulus", None), ("modulus_over_affine", exact(0.0))):
         values, halves = values_and_halves([measured(one, quantity) for one in results])
-        found[f"{quantity}_exponent"] = Value(propagated(lambda y: fitted_exponent(stress, y), values, halves, "the moduli"), due)
+        found[f"{quantity}_exponent"] = Value(propagated(lambda y: fitted_exponent(stress, y), values, halves, "the moduli"), due,
+                                              inapplicable=wet if due else "")
     values, halves = values_and_halves([measured(one, "modulus") for one in results])
     return Measurement(found, [profile("modulus", "Modulus where the load begins to fall", "normal stress (Pa)", "Pa", stress, [values],
                                        half=halves)])

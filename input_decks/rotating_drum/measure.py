@@ -2,7 +2,9 @@
 D is known within U_val, U_val² = U_num² + U_input² + U_D²; the studies of friction and stiffness add U_input and U_num."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,8 +27,11 @@ METHODS = {"surface_speed": "surface_speed", "zero_crossing": "turn", "layer_dep
 SPEED_READ, PLACE_READ = 0.01, 0.0005
 # The angle depends on it by more than its limits.
 UNKNOWN = "the length of the other code's drum is not known"
-# What makes a run one of the tracked drum, and of the drum seen along its axis.
+# What makes a run one of the tracked drum, of the other code's drum, and of the drum seen along its axis.
 ALIZADEH = {"drum_radius": 0.12, "drum_speed": 1.2147, "solid_filling": 0.1962, "grain_diameter": 0.003}
+SUNDAY = {"ends": "walls", "wall_lining": "grains", "drum_radius": 0.03, "drum_depth": 0.005, "solid_filling": 0.3,
+          "grain_diameter": 0.001, "grain_diameter_spread": 0.1, "restitution": 0.97, "wall_restitution": 0.82, "grain_friction": 0.16,
+          "wall_friction": 0.45, "static_friction": None, "kinetic_friction": None, "kinetic_friction_ratio": 1.0, "bridge_volume": 0.0}
 SEEN = {"drum_radius": 0.042, "drum_depth": 0.02, "solid_filling": 0.262}
 # 95 % limits over the standard uncertainty.
 CONFIDENT = 1.96
@@ -82,6 +87,18 @@ def other_code() -> dict[str, dict[str, float]]:
             for row in reference_rows(HERE / "sunday_2020.csv")}
 
 
+def of_other_code(p: Mapping[str, Any]) -> dict[str, float] | None:
+    """The row of that table for a run with the parameters `p`, by its Froude number and rolling resistance; None where there is none."""
+    if any(p[name] != value for name, value in SUNDAY.items()) or p["wall_rolling_friction"] is not None:
+        return None
+    froude = p["drum_speed"] ** 2 * p["drum_radius"] / p["gravity"]
+    rolling = p["rolling_friction"] if p["rolling_resistance"] != "off" else 0.0
+    for row in reference_rows(HERE / "sunday_2020.csv"):
+        if math.isclose(row.number("froude"), froude, rel_tol=0.01) and row.number("rolling_friction") == rolling:
+            return other_code()[row["variant"]] if p["rolling_resistance"] in ("off", "constant_torque") else None
+    return None
+
+
 def seen(speed: float) -> tuple[dict[str, Estimate], Array] | None:
     """What images show of the drum that turns with `speed` (rad/s): quantities, and its surface as rows x, y, lower and upper level (m);
     None for a speed that was not published."""
@@ -119,7 +136,7 @@ def surfaces(views: list[SideView], data: Array | None) -> Curve:
 
 def measure(replicas: Replicas) -> Measurement:
     """Values and profiles of all replicas of a series."""
-    drums, given, variant = [read(replica) for replica in replicas], replicas[0].parameters, replicas[0].record["variant"]
+    drums, given = [read(replica) for replica in replicas], replicas[0].parameters
     tracked_drum = given["ends"] == "periodic" and all(given[name] == value for name, value in ALIZADEH.items())
     found = [dict(zip([*METHODS, "overhead"], estimates(drum, list(METHODS.values())).values(), strict=True)) for drum in drums]
     over = {name: pooled(found, name) for name in found[0]}
@@ -132,7 +149,7 @@ def measure(replicas: Replicas) -> Measurement:
         for name, datum in data().items():
             values[name] = Value(over[name], datum, reason="" if name == "layer_shape" else missing_balance(),
                                  detail=compared(over[name].value, datum, sim=over[name].half).text)
-    if row := other_code().get(variant):
+    if row := of_other_code(given):
         values["centrifuging"] = Value(over["overhead"], exact(row["centrifuging"]))
         if flows:
             depth, angle, d = over["layer_depth"], over["surface_angle"], given["grain_diameter"]

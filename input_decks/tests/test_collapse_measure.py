@@ -131,6 +131,20 @@ def test_frames_without_a_row_are_refused(tmp_path: Path) -> None:
         found(replica(tmp_path, first=2001))
 
 
+def test_a_column_that_still_rains_is_not_compared(tmp_path: Path) -> None:
+    def moving(energy: float) -> Callable[[np.ndarray], np.ndarray]:
+        """This energy (J) more until the gate has moved for ten rows."""
+        return lambda values: values + energy * (np.arange(ROWS) < OPENING + 10)
+
+    settled, raining = (found(replica(tmp_path / str(part), spoiled(kinetic_energy=moving(part * FALLEN),
+                                                                    tangential_elastic=moving(part * FALLEN)))) for part in (0.005, 0.05))
+    for name in ("aspect_ratio", "friction_share", "mean_run_out", "mean_height"):
+        assert settled[name]["compared"] and not settled[name]["reason"]
+        assert not raining[name]["compared"] and "raise settle_time" in raining[name]["reason"]
+    # The account balances in any state.
+    assert raining["energy_balance"]["verdict"] == "pass"
+
+
 def test_published_laws_where_they_hold() -> None:
     assert column_collapse.run_out_law(1.0) == pytest.approx(1.2) and column_collapse.run_out_law(8.0) == pytest.approx(7.6)
     assert column_collapse.run_out_law(2.0) is None

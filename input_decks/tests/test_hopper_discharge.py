@@ -52,9 +52,16 @@ def test_the_published_discharge_passes_whenever_its_gate_opens() -> None:
         assert "U_input" in found["rate"]["detail"]
 
 
-def test_of_other_slots_no_discharge_is_judged() -> None:
-    found = verdicts(outlet_width=0.01792)
+@pytest.mark.parametrize("changes", [{"outlet_width": 0.01792}, {"gravity": 1.62}, {"grain_friction": 0.5}, {"wall_friction": 0.0},
+                                     {"static_friction": 0.2}, {"restitution": 0.5}, {"grain_density": 1000.0}, {"bridge_volume": 1e-12}])
+def test_of_other_bins_no_discharge_is_judged(changes: dict[str, float]) -> None:
+    found = verdicts(**changes)
     assert not names(found, "pass") | names(found, "fail")
+
+
+@pytest.mark.parametrize("variant", ["anand", "friction_low", "friction_high", "stiff", "stiffer", "rolling"])
+def test_each_variant_of_the_published_bin_is_judged(variant: str) -> None:
+    assert {"rate", "curve", "discharged"} <= names(verdicts(**find("hopper_discharge").variants[variant]), "pass")
 
 
 def points(exponent: float = 1.5, k: float = 1.5) -> list[dict[str, Any]]:

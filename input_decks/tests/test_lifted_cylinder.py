@@ -44,11 +44,14 @@ def frame(step: int, places: Array) -> Any:
                            masses=np.full(count, 2500.0 * np.pi / 6.0 * D**3), ids=np.arange(count))
 
 
-def run(last: Array, first: Array | None = None, lost: int = 0, heavier: float = 1.0, speed: float = 0.0, **changes: Any) -> Any:
-    """A run that ends with grains at the places `last`, of which `lost` are gone; `heavier`: gravity over what the run says."""
+def run(last: Array, first: Array | None = None, lost: int = 0, heavier: float = 1.0, speed: float = 0.0, falling: float = 0.0,
+        **changes: Any) -> Any:
+    """A run that ends with grains at the places `last`, of which `lost` are gone; `heavier`: gravity over what the run says; `falling`: the
+    speed (m/s) of the grains when the lift begins."""
     p = defaults("lifted_cylinder", **changes)
     frames = [frame(step, last if first is None or step > FRAMES[0] else first) for step in FRAMES]
     frames[-1].velocities[:, 0] = speed
+    frames[0].velocities[:, 2] = -falling
     weight, steps = frames[-1].masses.sum() * 9.81 * heavier, np.arange(10, FRAMES[-1] + 10, 10)
     rows = {"step": steps, "pan_fz": np.full(len(steps), weight), "pan_jz": 0.9 * weight * STEP * steps,
             "cylinder_jz": 0.1 * weight * STEP * steps}
@@ -67,13 +70,13 @@ def cones(height: float = 0.02, radius: float = 0.08) -> list[Array]:
     return [cone(height, radius, turn) for turn in (0.1, 0.5, 0.9)]
 
 
-def released(run_out: float, height: float) -> Verdicts:
+def released(run_out: float, height: float, falling: float = 0.0) -> Verdicts:
     """What is measured of columns of H/R = 1 that leave a cone with this run-out and height, over R."""
     radius = COLUMN["cylinder_radius"]
     cell = 0.9 * D
     side = np.arange(-radius, radius, cell) + 0.5 * cell
     column = np.array([(x, y, z) for x in side for y in side for z in np.linspace(0.0, radius, 13) if np.hypot(x, y) < radius])
-    return verdicts(*cones(height * radius, (1.0 + run_out) * radius), first=column, **COLUMN)
+    return verdicts(*cones(height * radius, (1.0 + run_out) * radius), first=column, falling=falling, **COLUMN)
 
 
 def scattered(count: int = 700, seed: int = 1) -> Array:
@@ -134,6 +137,14 @@ def test_what_is_measured_depends_on_friction_and_speed() -> None:
 def test_a_heap_that_moves_is_not_judged_by_its_weight() -> None:
     found = verdicts(*cones(), speed=0.5)
     assert found["weight_error"]["reason"] == "the grains still move" and "weight_error" not in names(found, "pass")
+
+
+def test_what_rains_while_the_cylinder_rises_is_not_judged() -> None:
+    heap, column = verdicts(*cones(), falling=0.3), released(1.25, 0.7, falling=0.3)
+    laws = {"run_out_of_code", "height_of_code", "run_out_of_columns", "height_of_columns"}
+    assert "raise settle_time" in heap["angle"]["reason"] and not heap["angle"]["compared"]
+    assert {column[name]["verdict"] for name in laws} == {"info"} and "raise settle_time" in column["run_out_of_code"]["reason"]
+    assert laws & names(released(1.25, 0.7, falling=0.005), "pass")
 
 
 @pytest.mark.parametrize(("aspect", "run_out", "height"), [(0.5, 0.62, 0.5), (1.0, 1.24, 0.88), (4.0, 3.2, 0.88 * 4.0 ** (1.0 / 6.0))])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dembark.common.errors import DembarkError
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 
 oedometer = module("oedometer")
@@ -73,15 +74,16 @@ def compressed(*, k0: float = 0.64, loose: float = 0.0, power: float = 1.0 / 3.0
                                     "grain_static": p["grain_friction"]})
 
 
-def verdicts(**changes: Any) -> dict[str, dict[str, Any]]:
-    return judged("oedometer", oedometer.measure([compressed(**changes)]))
+def verdicts(packings: int = 3, **changes: Any) -> dict[str, dict[str, Any]]:
+    return judged("oedometer", oedometer.measure([compressed(**changes)] * packings))
 
 
-def of_loads(power: float) -> dict[str, dict[str, Any]]:
+def of_loads(power: float, bridge_volume: float = 0.0) -> dict[str, dict[str, Any]]:
     """The study of runs whose modulus goes as the load to this `power`, that of affine contacts as the load to 1/3."""
     loads = {octaves: 2.0**octaves for octaves in (2, 3, 4, 5)}
     return judged("oedometer", oedometer.study("load", [
-        point({"octaves": octaves, "normal_stress": 500.0}, {"modulus": load**power, "modulus_over_affine": load ** (power - 1.0 / 3.0)})
+        point({"octaves": octaves, "normal_stress": 500.0, "bridge_volume": bridge_volume},
+              {"modulus": load**power, "modulus_over_affine": load ** (power - 1.0 / 3.0)})
         for octaves, load in loads.items()], "octaves"))
 
 
@@ -129,6 +131,32 @@ def test_the_affine_modulus_is_that_of_a_compressed_layer() -> None:
 
 def test_grains_without_friction_have_no_angle_to_compare_with() -> None:
     assert verdicts(grain_friction=0.0)["k0"]["reason"] == "grains without friction"
+
+
+def test_one_packing_does_not_show_its_spread() -> None:
+    one = verdicts(packings=1, grain_diameter_spread=0.0, grain_friction=0.3, loose=0.593)
+    for name in ("compression", "modulus", "modulus_over_affine", "solid_fraction", "coordination"):
+        assert one[name]["interval"] is None and one[name]["verdict"] == "info"
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # no stiffness without contacts
+def test_wet_grains_are_not_judged_as_dry_ones_and_bridges_are_no_contacts() -> None:
+    equal: dict[str, Any] = {"grain_diameter_spread": 0.0, "grain_friction": 0.3, "loose": 0.45}
+    dry, wet = verdicts(**equal), verdicts(**equal, bridge_volume=1e-13)
+    assert {"k0", "modulus_over_affine", "solid_fraction"} & names(wet, "pass") | names(wet, "fail") == set()
+    assert {wet[name]["reason"] for name in ("k0", "modulus_over_affine", "solid_fraction")} == {"liquid bridges"}
+    # These grains of the lattice have gaps between them, over which bridges pull.
+    assert dry["coordination"]["value"] > 2.0 and wet["coordination"]["value"] == 0.0
+    assert of_loads(0.4, bridge_volume=1e-13)["modulus_over_affine_exponent"]["reason"] == "liquid bridges"
+
+
+def test_a_layer_too_thin_to_be_measured_gets_one_line() -> None:
+    thin = compressed()
+    for frame in thin.grains():
+        frame.positions[:, 2] *= 0.4
+    with pytest.raises(DembarkError, match=r"grain_diameter apart, nothing is measured within 2 .* raise grain_count") as refused:
+        oedometer.measure([thin])
+    assert "\n" not in str(refused.value)
 
 
 TINY = {"grain_count": 150, "cell_length": 0.005, "cell_width": 0.004, "octaves": 2, "octave_time": 0.02, "rest_time": 0.02, "frames": 40}

@@ -92,6 +92,8 @@ def test_wrong_physics_is_seen(wrong: str, finished: Any, monkeypatch: pytest.Mo
     right = [penetration.flight(run.times()["time"], run.times()["ball_height"]) for run in packings(finished)]
     known = {name: [float(np.mean([run[name] for run in right]))] * 2 for name in right[0] if name in CASE.quantities}
     monkeypatch.setattr(penetration, "published", lambda: known)
+    monkeypatch.setattr(penetration, "of_packings", lambda: dict.fromkeys(known, 0.0))
+    monkeypatch.setattr(penetration, "another", lambda _: "")
     assert not names(judged("penetration", penetration.measure(packings(finished))), "fail")
     assert SEEN[wrong] <= names(judged("penetration", penetration.measure(packings(finished, wrong))), "fail")
 
@@ -101,7 +103,7 @@ def written(heights: list[Any], bed: str = "settled", until: float = 0.045) -> l
     places = begun(**SMALL)
     frame = SimpleNamespace(ids=np.arange(1, len(places) + 1), positions=places, radii=np.full(len(places), 0.001))
     times = 1e-3 * np.arange(1, round(1e3 * until) + 1)
-    values = resolve(CASE, None, None, SMALL) | {"bed": bed}
+    values = resolve(CASE, None, None, {"bed": bed})
     return [SimpleNamespace(parameters=values, derived={"first": 0}, grains=lambda: [frame], times=lambda one=one: {
         "step": np.arange(1, len(times) + 1), "time": times, "ball_height": np.asarray(one)[: len(times)]}) for one in heights]
 
@@ -124,6 +126,32 @@ def test_the_code_that_the_authors_leave_out_and_the_public_bed_do_not_count() -
     assert len(known["deepest_point"]) == 7
     # The mean of MUSEN with its first packing would be -60.045 mm.
     assert min(known["height_24"]) > -0.06006 and any(value == pytest.approx(-0.0600254) for value in known["height_24"])
+
+
+def test_the_mean_of_the_codes_is_known_as_well_as_their_packings_are() -> None:
+    found = judged("penetration", penetration.measure(written([penetration.table("dosta_2024_height.csv")[:, 1]])))
+    halves = {name: 0.5 * float(np.diff(found[name]["reference_interval"])[0]) for name in FLIGHT}
+    due = {"height_24": 5.9e-5, "height_28": 1.2e-4, "deepest_point": 1.3e-4, "deepest_time": 2.8e-4, "height_40": 1.11e-3,
+           "rebound_speed": 0.109}
+    assert halves == {name: pytest.approx(half, rel=0.02) for name, half in due.items()}
+
+
+@pytest.mark.parametrize("changes", [{"gravity": 1.62}, {"ball_diameter": 0.01}, {"friction": 0.1}, {"box_width": 0.07}])
+def test_of_other_problems_no_flight_is_judged(changes: dict[str, float]) -> None:
+    assert {name for name, value in penetration.DOSTA.items() if value != CASE.parameters[name].value} == set()
+    runs = written([penetration.table("dosta_2024_height.csv")[:, 1]] * 3)
+    assert names(judged("penetration", penetration.measure(runs)), "pass") >= FLIGHT
+    for run in runs:
+        run.parameters |= changes
+    found = judged("penetration", penetration.measure(runs))
+    assert {found[name]["reason"] for name in FLIGHT} == {f"not the published problem: another {next(iter(changes))}"}
+
+
+def test_a_bed_too_low_for_its_window_has_no_solid_fraction() -> None:
+    (run,) = written([penetration.table("dosta_2024_height.csv")[:, 1]])
+    run.grains()[0].positions = np.array([[0.0, 0.0, run.parameters["floor"] + 0.001]] * 800)
+    found = judged("penetration", penetration.measure([run]))["solid_fraction"]
+    assert found["value"] is None and "too low" in found["reason"]
 
 
 TOUCH = 0.021  # s

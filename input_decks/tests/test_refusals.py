@@ -33,6 +33,11 @@ from dembark.validation.case.resolve import resolve
       for case in ("bulk_density", "oedometer", "shear_cell") for side in ("cell_length", "cell_width")),
     *((case, {"liquid_content": 0.01, "bridge_volume": 8e-11}, "set liquid_content or bridge_volume, not both")
       for case in ("plug_flow", "silo")),
+    ("silo", {"wall_speed": 0.0}, "cylinder_radius must be at least 10 grain_diameter, or wall_speed above 0"),
+    *((case, {name: 0.1}, "need a resistance: set rolling_resistance too, or both to 0")
+      for case in ("avalanche", "shear_cell") for name in ("rolling_friction", "wall_rolling_friction")),
+    ("lifted_cylinder", {"rolling_resistance": "off"}, "or both to 0"),
+    ("hopper_discharge", {"rolling_length": 1e-4}, "rolling_length needs a resistance"),
     ("vibro_sieve", {"motion": "none"}, r"motion must be harmonic, motion_direction z, with motion = none, motion_direction = z in case"),
     *((case, {time: 1e300}, r"would have 1e30\d steps, it may have 1e\+15, take shorter times")
       for case, time in (("silo", "measure_time"), ("single_contact", "duration"))),

@@ -26,31 +26,33 @@ FLOW = {"surface_speed", "zero_crossing", "layer_depth"}
 def flow(angle: float = 27.0, surface: float = -0.03, turn: float = -0.066, speed: float = 0.345, carried: float = 1.0,
          power: float = 1.0, variant: str = "alizadeh", ring: bool = False) -> Any:
     """A run whose grains fill a segment, on a lattice that is shifted from frame to frame: they turn with the drum (times `carried`) below
-    `turn`, and above it their speed falls to -`speed` at the `surface`, linearly or as a `power` of the height. `ring`: all turn with the
-    drum, at the wall."""
-    given = defaults("rotating_drum", frames=12) | ({} if variant == "alizadeh" else {"solid_filling": 0.2})
+    `turn`, and above it their speed falls to -`speed` at the `surface`, linearly or as a `power` of the height; of `alizadeh`, in drums of
+    other sizes and speeds in proportion. `ring`: all turn with the drum, at the wall."""
+    given = defaults("rotating_drum") | CASE.variants.get(variant, {"solid_filling": 0.2}) | {"frames": 12}
     random, radius, omega = np.random.default_rng(3), given["drum_radius"], given["drum_speed"]
+    size = radius / 0.12
+    surface, turn, speed = surface * size, turn * size, speed * size * omega / 1.2147
     t = np.radians(angle)
     along, normal = np.array([np.cos(t), np.sin(t)]), np.array([-np.sin(t), np.cos(t)])
 
     def frame(_: int) -> Any:
         lattice = np.linspace(-radius, radius, 160)
-        place = np.stack(np.meshgrid(lattice, lattice), axis=-1).reshape(-1, 2) + random.uniform(-0.001, 0.001, 2)
+        place = np.stack(np.meshgrid(lattice, lattice), axis=-1).reshape(-1, 2) + random.uniform(-0.001, 0.001, 2) * size
         n = place @ normal
-        place = place[(np.hypot(*place.T) < radius - 0.0015) & (np.hypot(*place.T) > 0.09 if ring else n < surface)]
+        place = place[(np.hypot(*place.T) < radius - 0.0015 * size) & (np.hypot(*place.T) > 0.09 * size if ring else n < surface)]
         n, s = place @ normal, place @ along
         back = np.clip((n - turn) / (surface - turn), 0.0, 1.0) ** power
         turning = ring | (n < turn)
         velocity = np.where(turning, -carried * omega * n, -omega * turn * (1.0 - back) - speed * back)[:, None] * along
         velocity += np.where(turning, carried * omega * s, 0.0)[:, None] * normal
         zero, ones = np.zeros(len(place)), np.ones(len(place))
-        one = SimpleNamespace(positions=np.column_stack([place, zero]), velocities=np.column_stack([velocity, zero]), radii=0.0015 * ones,
-                              types=ones)
+        one = SimpleNamespace(positions=np.column_stack([place, zero]), velocities=np.column_stack([velocity, zero]),
+                              radii=0.0015 * size * ones, types=ones)
         one.select = lambda kept: one if kept.all() else None
         return one
 
     frames = [frame(k) for k in range(given["frames"])]
-    return SimpleNamespace(parameters=given, record={"variant": variant}, grains=lambda: frames)
+    return SimpleNamespace(parameters=given, record={"variant": "any"}, grains=lambda: frames)
 
 
 def verdicts(**changes: Any) -> dict[str, Any]:
@@ -96,6 +98,17 @@ def test_of_other_drums_no_flow_is_judged() -> None:
 def test_no_angle_is_judged_while_the_length_of_the_drum_is_unknown() -> None:
     found = verdicts(angle=26.1, variant="sunday_smooth")["repose_angle"]
     assert found["reference"] == 26.1 and found["verdict"] == "info" and "length" in found["reason"]
+
+
+def test_the_drum_of_the_other_code_is_known_by_its_parameters() -> None:
+    rows = drum.other_code()
+    for variant in CASE.variants:
+        given = defaults("rotating_drum") | CASE.variants[variant]
+        assert drum.of_other_code(given) == (pytest.approx(rows[variant], nan_ok=True) if variant in rows else None)
+    given = defaults("rotating_drum") | CASE.variants["sunday_smooth"]
+    for change in ({"drum_speed": 1.0}, {"gravity": 1.62}, {"rolling_resistance": "constant_torque", "rolling_friction": 0.02},
+                   {"drum_radius": 0.04}, {"grain_friction": 0.3}):
+        assert drum.of_other_code(given | change) is None
 
 
 def study(name: str, along: str, values: list[float], speeds: list[float]) -> dict[str, Any]:

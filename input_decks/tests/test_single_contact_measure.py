@@ -83,6 +83,15 @@ def test_the_set_up_of_the_decks_is_what_they_are_compared_with(variant):
     np.testing.assert_allclose(np.pi / 6.0 * bodies.densities * bodies.diameters**3, one.mass[:count].ravel(), rtol=1e-12)
 
 
+@pytest.mark.parametrize("variant", find("single_contact").variants)
+def test_the_published_impacts_are_known_by_their_parameters(variant: str) -> None:
+    p = parameters(variant)
+    assert single_contact.published_test(p) == variant
+    assert single_contact.published_test(p | {"points": 3, "time_step": 2.0 * p["time_step"]}) == variant
+    for change in ({"speed": 0.7}, {"friction": 0.77}, {"youngs_modulus_b": 3e9}):
+        assert single_contact.published_test(p | change) == ""
+
+
 def compared(variant: str, found: Measurement) -> Verdicts:
     return judged("single_contact", with_published(found, single_contact.PUBLISHED, variant, single_contact.LABELS))
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from dembark.common.errors import DembarkError
+from dembark.input_decks.common.setup import friction as common_friction
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.validation.case.deck import derived, prepare
 from dembark.validation.case.folders import find
@@ -65,7 +66,7 @@ def compressed(*, friction: float = 0.3, stiffness: float = 1.0, cohesion: float
         frames.append((grains, here))
     return SimpleNamespace(parameters=p, time_step=1e-5, times=lambda: times, grains=lambda: [one for one, _ in frames],
                            paired_frames=lambda: iter(frames),
-                           derived={"start_step": START, "grain_static": p["static_friction"] or p["grain_friction"],
+                           derived={"start_step": START, **common_friction(SimpleNamespace(**p)),
                                     **dict(zip(("cells_x", "cells_y", "cells_z"), CELLS, strict=True))})
 
 
@@ -138,6 +139,19 @@ def test_what_holds_for_dry_grains_with_friction_is_not_asked_of_others() -> Non
     slippery = compressed(**LATTICE)
     slippery.derived["grain_static"] = 0.0
     assert "without friction" in judged("triaxial", triaxial.measure([slippery]))["modulus_over_affine"]["reason"]
+
+
+def test_the_theory_of_the_lattice_is_not_asked_of_other_contacts() -> None:
+    assert verdicts(**LATTICE)["lattice_ratio"]["verdict"] == "pass"
+    weaker = verdicts(**LATTICE, kinetic_friction=0.2)["lattice_ratio"]
+    assert weaker["verdict"] == "info" and "another friction" in weaker["reason"] and weaker["reference"] is not None
+    assert verdicts(**LATTICE, bridge_volume=1e-13)["lattice_ratio"]["reason"] == "liquid bridges"
+
+
+def test_one_packing_does_not_show_its_spread() -> None:
+    disorder, lattice = verdicts(), verdicts(**LATTICE)
+    for name in ("peak_ratio", "volume_change", "solid_fraction", "modulus"):
+        assert disorder[name]["interval"] is None and lattice[name]["interval"] is not None
 
 
 @pytest.mark.parametrize(("values", "expected"), [

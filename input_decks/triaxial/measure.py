@@ -145,23 +145,29 @@ def estimates(replica: Replica) -> dict[str, Estimate]:
     late = test.frame_steps > test.frame_steps[-1] - STEADY * np.ptp(test.frame_steps)
     last, highest, slope = block_mean(test.ratio[end]), peak(test), modulus(test)
     engine = np.array([test.stress[np.argmin(np.abs(test.step - step))].mean() for step in test.frame_steps[1:]])
+    lattice = p["arrangement"] == "fcc"
+
+    def of_packing(value: float) -> Estimate:
+        return exact(value) if lattice else Estimate(value, math.inf, "one packing does not show its spread")
+
     found = {
-        "peak_ratio": exact(highest),
-        "peak_angle": exact(angle(highest)),
+        "peak_ratio": of_packing(highest),
+        "peak_angle": of_packing(angle(highest)),
         "last_ratio": last,
         "last_angle": Estimate(angle(last.value), angle(last.value + last.half) - angle(last.value), last.basis),
         "stress_across": block_mean((test.stress[:, :2].mean(axis=1) / test.stress[:, 2])[end]),
-        "volume_change": exact(float(test.strain[-1].sum())),
-        "solid_fraction": exact(float(test.fraction[0])),
+        "volume_change": of_packing(float(test.strain[-1].sum())),
+        "solid_fraction": of_packing(float(test.fraction[0])),
         "last_fraction": block_mean(test.fraction[late]),
         "coordination": block_mean(test.coordination[late]),
-        "modulus": exact(slope),
-        "modulus_over_affine": exact(slope / test.affine),
+        "modulus": of_packing(slope),
+        "modulus_over_affine": of_packing(slope / test.affine),
+        # A bound, which each packing has to keep.
         "affine_excess": exact(max(slope / test.affine - 1.0, 0.0)),
         "confining_error": block_mean(test.stress[end][:, :2].mean(axis=1) / p["confining_stress"] - 1.0),
         "contact_stress_error": block_mean(test.frame_stress[1:].mean(axis=1) / engine - 1.0),
     }
-    if p["arrangement"] == "fcc":
+    if lattice:
         ratio = 2.0 * test.stress[:, 2] / test.stress[:, :2].sum(axis=1)
         top = int(np.argmax(ratio))
         cell = test.sides[top] / [numbers[f"cells_{axis}"] for axis in "xyz"]
@@ -176,7 +182,10 @@ def measure(replicas: Replicas) -> Measurement:
     lattice = p["arrangement"] == "fcc"
     values = {name: Value(one) for name, one in over.items() if name != "lattice_theory"}
     if lattice:
-        values["lattice_ratio"] = Value(over["lattice_ratio"], over["lattice_theory"])
+        numbers = replicas[0].derived
+        weaker = "" if numbers["grain_kinetic"] == numbers["grain_static"] else "sliding contacts have another friction than those at rest"
+        values["lattice_ratio"] = Value(over["lattice_ratio"], over["lattice_theory"],
+                                        inapplicable=weaker or ("liquid bridges" if p["bridge_volume"] > 0.0 else ""))
         del values["affine_excess"]
     other = "" if replicas[0].derived["grain_static"] else "grains without friction, whose contacts have no tangential stiffness"
     other = other if lattice else "grains in disorder"
