@@ -33,7 +33,7 @@ from dembark.validation.case.resolve import resolve
       for case in ("bulk_density", "oedometer", "shear_cell") for side in ("cell_length", "cell_width")),
     *((case, {"liquid_content": 0.01, "bridge_volume": 8e-11}, "set liquid_content or bridge_volume, not both")
       for case in ("plug_flow", "silo")),
-    ("silo", {"wall_speed": 0.0}, "cylinder_radius must be at least 10 grain_diameter, or wall_speed above 0"),
+    ("silo", {"wall_speed": 0.0}, "cylinder_radius must be at least 7 grain_diameter, or wall_speed above 0"),
     *((case, {name: 0.1}, "need a resistance: set rolling_resistance too, or both to 0")
       for case in ("avalanche", "shear_cell") for name in ("rolling_friction", "wall_rolling_friction")),
     ("lifted_cylinder", {"rolling_resistance": "off"}, "or both to 0"),

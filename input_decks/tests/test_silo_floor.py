@@ -66,7 +66,7 @@ def test_the_published_law_is_one_distribution_and_passes() -> None:
     assert floor.exponential_slope(forces) == pytest.approx(1.8, rel=0.01)
     assert floor.power_exponent(forces) == pytest.approx(0.3, abs=0.01)
     # Three packings: the interval within one and what inputs change are together more than is allowed.
-    found = verdicts(forces, forces, forces)
+    found = verdicts(forces, published(2999), published(3001))
     assert {"floor_beta", "floor_beta_loaded", "floor_alpha"} <= names(found, "pass"), found
     assert found["floor_idle"]["value"] == pytest.approx(np.mean(forces < 0.0101)) and found["floor_cover"]["value"] > 0.5
     assert abs(found["floor_correlation"]["value"]) < 0.05
