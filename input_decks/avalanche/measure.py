@@ -187,9 +187,9 @@ def _chute(replicas: Replicas) -> Measurement:
     if p["slope_angle"] <= REST:
         values["rest_speed"] = Value(exact(max(abs(one.value) for one in means)), exact(0.0))
     else:
-        angle, speed = p["slope_angle"], values["mean_speed"].estimate
+        angle, mean = p["slope_angle"], values["mean_speed"].estimate
         between = f"the power is known up to {SLOW:g} rad and from {FAST:g} rad on" if SLOW < angle < FAST else ""
-        still = "" if abs(speed.value) > speed.half else "the mean speed is not above its interval"
+        still = "" if abs(mean.value) > mean.half else "the mean speed is not above its interval"
         values["profile_power"] = Value(over_replicas(powers), exact(1.0 if angle <= SLOW else 1.5), inapplicable=between or still)
     return Measurement(values, curves)
 
