@@ -208,6 +208,8 @@ def test_water_runs_against_cubes_in_an_engine(engine: str, scheme: dict[str, An
     one = simulate("dam_break_cubes", engine, TINY | scheme)
     found = judged("dam_break_cubes", dam.measure([one]))
     assert {"leaked", "inside", "energy_growth"} <= names(found, "pass"), found
+    height = one.times()[f"cube{int(one.derived['cube_count'])}_z"]
+    assert np.max(height) - height[0] <= 0.015  # the run is too short and too small for `rise`
     rows = one.times()
     assert 1.0 <= rows["time"][-1] / 0.42 < 1.1
     # The water has come, and the cubes are where they were pushed, the lowest ones first.

@@ -12,10 +12,8 @@ from rig import lammps_driver, liggghts_driver
 from rig.chains import MATERIAL, RADIUS, CompressedChain
 from rig.lammps_driver import run_deck
 from rig.liggghts_driver import Run, read_dump
-from rig.monitor import MONITOR, POSITION, SPIN, THERMO, VELOCITY, assert_estimates_are_true, figures, line_of_grains
-from rig.scenarios import Material
+from rig.monitor import BED, MONITOR, POSITION, SPIN, THERMO, VELOCITY, assert_estimates_are_true, figures, line_of_grains, oblique_impact
 
-BED = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.7, youngs_modulus=5e6)
 SOFTER = replace(MATERIAL, normal_law="hertz", restitution=0.6)
 
 
@@ -59,15 +57,7 @@ def test_impacts_are_judged_as_in_liggghts(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("dimension", "motion"), [(3, "nve/sphere"), (2, "nve/sphere"), (2, "nve/sphere disc"), (3, "nve")])
 def test_impacts_are_those_of_discs_and_of_grains_that_do_not_turn(tmp_path: Path, dimension: int, motion: str) -> None:
     """The reference of an oblique impact has the moments of inertia with which the engine turns the grains."""
-    text = line_of_grains(lammps_driver, [-RADIUS - 1e-5, RADIUS + 1e-5], [0.5, -0.5], replace(BED, restitution=0.9), 2e-6, f"""\
-set atom 1 vy 0.3
-fix motion all {motion}
-{MONITOR}speed 1 every 1 impacts 1 action report
-{THERMO}thermo 100
-run 1500""")
-    if dimension == 2:
-        text = text.replace("boundary f f f", "dimension 2\nboundary f f p")
-    found = figures(run_deck(tmp_path, text))[-1, 1:]
+    found = figures(run_deck(tmp_path, oblique_impact(lammps_driver, dimension, motion, 2e-6)))[-1, 1:]
     assert found[20] == 1 and found[21] < 5e-3
 
 

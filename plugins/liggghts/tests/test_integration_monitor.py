@@ -8,11 +8,8 @@ import pytest
 from rig import fluid, liggghts_driver
 from rig.chains import MATERIAL, RADIUS, CompressedChain, solitary_wave
 from rig.liggghts_driver import read_dump, run_deck
-from rig.monitor import MONITOR, POSITION, SPIN, THERMO, VELOCITY, assert_estimates_are_true, figures, line_of_grains
+from rig.monitor import BED, MONITOR, POSITION, SPIN, THERMO, VELOCITY, assert_estimates_are_true, figures, line_of_grains, oblique_impact
 from rig.packing import CREATE, STATE, packing
-from rig.scenarios import Material
-
-BED = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.7, youngs_modulus=5e6)
 
 
 def compressed(folder, chain, steps, words="speed 1 limit 1e9 every 1"):
@@ -177,26 +174,12 @@ run {round(2.4e-3 / step)}""")
     assert np.log2(found[2.4e-5][22] / found[1.5e-6][22]) / 4 == pytest.approx(1.0, abs=0.3)
 
 
-def oblique(folder, dimension, motion):
-    """The largest deviation of one oblique impact with friction, with steps short enough for 1e-3."""
-    step = 2e-6 if dimension == 3 else 2e-5
-    text = line_of_grains(liggghts_driver, [-RADIUS - 1e-5, RADIUS + 1e-5], [0.5, -0.5], replace(BED, restitution=0.9), step, f"""\
-set atom 1 vy 0.3
-fix motion all {motion}
-{MONITOR}speed 1 every 1 impacts 1 action report
-{THERMO}thermo 100
-run 1500""")
-    if dimension == 2:
-        text = text.replace("boundary f f f", "dimension 2\nboundary f f p")
-    found = figures(run_deck(folder, text))[-1, 1:]
-    assert found[20] == 1
-    return found[21]
-
-
 @pytest.mark.parametrize(("dimension", "motion"), [(3, "nve/sphere"), (2, "nve/sphere"), (3, "nve"), (2, "nve")])
 def test_impacts_are_those_of_discs_in_the_plane_and_of_grains_that_do_not_turn(tmp_path, dimension, motion):
     """The reference has the moments of inertia with which the engine turns the grains."""
-    assert oblique(tmp_path, dimension, motion) < 5e-3
+    step = 2e-6 if dimension == 3 else 2e-5  # short enough for 1e-3
+    found = figures(run_deck(tmp_path, oblique_impact(liggghts_driver, dimension, motion, step)))[-1, 1:]
+    assert found[20] == 1 and found[21] < 5e-3
 
 
 def test_contacts_of_a_hybrid_are_judged(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
@@ -14,6 +15,7 @@ from rig.chains import DENSITY, RADIUS, CompressedChain
 from rig.liggghts_driver import Run
 from rig.scenarios import Material
 
+BED = Material(static_friction=0.5, kinetic_friction=0.4, restitution=0.7, youngs_modulus=5e6)
 COUNT = 24
 MONITOR = "fix watch all integration/monitor "
 THERMO = (f"thermo_style custom step {' '.join(f'f_watch[{k}]' for k in range(1, COUNT + 1))}\n"
@@ -44,6 +46,17 @@ def law(driver: ModuleType, m: Material) -> str:
     if driver is lammps_driver:
         return f"pair_style dembark/granular {lammps_driver.settings(m)}\npair_coeff * * {lammps_driver.coefficients(m)}"
     return f"{liggghts_driver.properties(m)}\npair_style gran {liggghts_driver.models(m)}\npair_coeff * *"
+
+
+def oblique_impact(driver: ModuleType, dimension: int, motion: str, step: float) -> str:
+    """A deck of one impact of two grains with friction, that fix `motion` moves in a space of this dimension."""
+    text = line_of_grains(driver, [-RADIUS - 1e-5, RADIUS + 1e-5], [0.5, -0.5], replace(BED, restitution=0.9), step, f"""\
+set atom 1 vy 0.3
+fix motion all {motion}
+{MONITOR}speed 1 every 1 impacts 1 action report
+{THERMO}thermo 100
+run 1500""")
+    return text.replace("boundary f f f", "dimension 2\nboundary f f p") if dimension == 2 else text
 
 
 def line_of_grains(driver: ModuleType, places: ArrayLike, velocities: ArrayLike, material: Material, step: float, rest: str) -> str:
