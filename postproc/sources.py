@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -159,6 +160,11 @@ class Selection:
     first: GrainFrame
     diameter: float
 
+    @cached_property
+    def ends(self) -> tuple[GrainFrame, GrainFrame]:
+        """The first frame and the last one, with grains or without."""
+        return self.source.grains[self.numbers[0]], self.source.grains[self.numbers[-1]]
+
     def averaging_notes(self) -> list[str]:
         """Lines about what makes a mean over the frames another than that over time, or fields wrong at faces of the box."""
         notes, grains = [], self.source.grains
@@ -167,7 +173,7 @@ class Selection:
         if len(between) and np.ptp(between) > 0.01 * between.max():
             unit = "s" if times is grains.times else "steps"
             notes.append(f"note: frames lie {between.min():.4g} to {between.max():.4g} {unit} apart; means are over frames, not over time")
-        begin, end = (grains[number] for number in (self.numbers[0], self.numbers[-1]))
+        begin, end = self.ends
         edges = cell(begin.low, begin.high, begin.tilt)
         if np.any(np.abs(cell(end.low, end.high, end.tilt) - edges)[begin.periodic] > 1e-6 * edges.max()):
             notes.append("note: the periodic box changes its shape; velocities, and powers of contacts across its faces, lack the speed of "
@@ -178,7 +184,7 @@ class Selection:
         """What was read; `diameters` (m) are the mean ones of the frames."""
         source, numbers = self.source, self.numbers
         first, last = (int(source.grains.steps[number]) for number in (numbers[0], numbers[-1]))
-        begin, end = (source.time(source.grains[number]) for number in (numbers[0], numbers[-1]))
+        begin, end = map(source.time, self.ends)
         when = f"{begin:.6g} to {end:.6g} s" if source.timed else "times are steps: give --time-step"
         count = f"frame {numbers[0]}" if len(numbers) == 1 else f"{len(numbers)} frames, {numbers[0]} to {numbers[-1]}"
         low, high = 1e3 * min(diameters, default=self.diameter), 1e3 * max(diameters, default=self.diameter)

@@ -21,6 +21,11 @@ def over_chaotic(values: Iterable[float]) -> Estimate:
     return over_replicas([Estimate(one, math.inf, "one run of a chaotic motion does not show its spread") for one in values])
 
 
+def of_packing(value: float) -> Estimate:
+    """A number of one run, which depends on its packing."""
+    return Estimate(value, math.inf, "one packing does not show its spread")
+
+
 def divided(found: Estimate, scale: float) -> Estimate:
     """`found` and its interval over `scale`."""
     return Estimate(found.value / scale, found.half / abs(scale), found.basis)

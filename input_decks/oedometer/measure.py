@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dembark.input_decks.common.estimates import values_and_halves
+from dembark.input_decks.common.estimates import of_packing, values_and_halves
 from dembark.input_decks.common.inside_layer import inside
 from dembark.input_decks.common.power_law import ordered
 from dembark.physics import effective_youngs_modulus
@@ -97,11 +97,6 @@ def moduli(test: Loading, p: Numbers) -> tuple[float, float]:
     density = np.mean(test.fraction[part] * test.coordination[part])
     slope = np.diff(test.load[part])[0] / np.diff(test.strain[part])[0]
     return float(slope), float(affine_modulus(np.asarray(pressure), np.asarray(density), p))
-
-
-def of_packing(value: float) -> Estimate:
-    """A number of one run, which depends on its packing."""
-    return Estimate(value, math.inf, "one packing does not show its spread")
 
 
 def estimates(replica: Replica) -> dict[str, Estimate]:

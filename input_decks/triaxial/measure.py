@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dembark.input_decks.common.estimates import values_and_halves
+from dembark.input_decks.common.estimates import of_packing, values_and_halves
 from dembark.input_decks.common.power_law import ordered
 from dembark.physics import effective_youngs_modulus
 from dembark.postproc import ContactFrame
@@ -146,22 +146,20 @@ def estimates(replica: Replica) -> dict[str, Estimate]:
     last, highest, slope = block_mean(test.ratio[end]), peak(test), modulus(test)
     engine = np.array([test.stress[np.argmin(np.abs(test.step - step))].mean() for step in test.frame_steps[1:]])
     lattice = p["arrangement"] == "fcc"
-
-    def of_packing(value: float) -> Estimate:
-        return exact(value) if lattice else Estimate(value, math.inf, "one packing does not show its spread")
-
+    # A lattice has no packing.
+    known = exact if lattice else of_packing
     found = {
-        "peak_ratio": of_packing(highest),
-        "peak_angle": of_packing(angle(highest)),
+        "peak_ratio": known(highest),
+        "peak_angle": known(angle(highest)),
         "last_ratio": last,
         "last_angle": Estimate(angle(last.value), angle(last.value + last.half) - angle(last.value), last.basis),
         "stress_across": block_mean((test.stress[:, :2].mean(axis=1) / test.stress[:, 2])[end]),
-        "volume_change": of_packing(float(test.strain[-1].sum())),
-        "solid_fraction": of_packing(float(test.fraction[0])),
+        "volume_change": known(float(test.strain[-1].sum())),
+        "solid_fraction": known(float(test.fraction[0])),
         "last_fraction": block_mean(test.fraction[late]),
         "coordination": block_mean(test.coordination[late]),
-        "modulus": of_packing(slope),
-        "modulus_over_affine": of_packing(slope / test.affine),
+        "modulus": known(slope),
+        "modulus_over_affine": known(slope / test.affine),
         # A bound, which each packing has to keep.
         "affine_excess": exact(max(slope / test.affine - 1.0, 0.0)),
         "confining_error": block_mean(test.stress[end][:, :2].mean(axis=1) / p["confining_stress"] - 1.0),

@@ -89,7 +89,9 @@ def grain_pressure(frame: GrainFrame, contacts: ContactFrame, walls: Sequence[Wa
     share = frame.radii[index] / np.maximum(frame.radii[index].sum(axis=1), 1e-300)[:, None]
     moment = -np.sum(contacts.forces * contacts.branch, axis=1)[:, None] * share
     total = sum(np.bincount(index[:, side], moment[:, side], len(frame.ids)) for side in (0, 1))
+    tree = cKDTree(into_box(frame)) if walls else None
     for wall in walls:
-        _, row = cKDTree(into_box(frame)).query(wall.positions)
+        assert tree is not None
+        _, row = tree.query(wall.positions)
         total = total - np.bincount(row, np.sum(wall.forces * (wall.points - wall.positions), axis=1), len(frame.ids))
     return np.asarray(total / (3.0 * volume(frame.radii)))

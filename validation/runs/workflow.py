@@ -104,8 +104,7 @@ def outdated(folder: Path) -> list[Path]:
         now = expand.campaign(read(folder / CAMPAIGN_FILE)) if (folder / CAMPAIGN_FILE).is_file() else expand.profile(folder.name)
     except DembarkError:
         return []
-    other = [Path(place).parent for place, run in now.folders.items() if made.get(place, run.inputs) != run.inputs]
-    return sorted(dict.fromkeys(other))
+    return sorted({Path(place).parent for place, run in now.folders.items() if made.get(place, run.inputs) != run.inputs})
 
 
 def _execute(folder: Path, tasks: Sequence[Task], todo: Sequence[Step], cancel: threading.Event, cores: int, memory: float | None = None,
