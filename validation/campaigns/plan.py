@@ -26,8 +26,8 @@ from .fitted import FittedParameters
 RETRIES = 3
 # Of a campaign.
 MOST_RUNS = 20000
-# A line of grains.dump and two to three of contacts.dump for each grain and frame.
-_BYTES_PER_GRAIN_AND_FRAME = 800
+# For each grain and frame a line of grains.dump, and two to three of contacts.dump.
+_BYTES_PER_GRAIN_AND_FRAME = {"grains": 200, "contacts": 600}
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,8 @@ class Run:
     def output_size(self) -> int | None:
         """About how many bytes the run writes; None when the case does not say how many particles or frames there are."""
         frames = self.values.get("frames")
-        return self.particles * frames * _BYTES_PER_GRAIN_AND_FRAME if self.particles and isinstance(frames, int) else None
+        line = sum(_BYTES_PER_GRAIN_AND_FRAME.get(output, 0) for output in self.case.outputs)
+        return self.particles * frames * line if self.particles and isinstance(frames, int) else None
 
     @cached_property
     def inputs(self) -> str:

@@ -10,6 +10,8 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from harness import decks, engine_pid, environment, lives, stand_in, wait_for  # noqa: F401
@@ -205,6 +207,13 @@ def test_too_little_room_is_told_before_the_start(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"disk is too full.*needs about"):
         run(tmp_path, grain_count=10**9, frames=10**6)
     assert not list(tmp_path.glob("replica-*"))
+
+
+@pytest.mark.parametrize(("outputs", "expected"), [(("grains", "contacts", "times"), 800), (("grains", "times"), 200), (("times",), 0)])
+def test_room_is_that_of_the_dumps_which_the_case_writes(outputs: tuple[str, ...], expected: int) -> None:
+    case = SimpleNamespace(outputs=outputs, particle_count=lambda values: values["grain_count"])
+    size = Run(cast(Any, case), "dry", "full", cast(Any, None), 1, {"grain_count": 1000, "frames": 10}).output_size
+    assert size == 10000 * expected
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
