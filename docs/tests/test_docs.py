@@ -63,6 +63,20 @@ def test_python_snippet(block: Block, tmp_path: Path) -> None:
         assert result.stdout == following.text
 
 
+def rows(text: str, title: str) -> list[str]:
+    """Rows of the first table under the section `title`."""
+    _, _, section = text.partition(f"# {title}\n")
+    return [line for line in re.split(r"\n#+ ", section)[0].splitlines() if line.startswith("| ")][1:]
+
+
+def test_the_readme_counts_what_fails_as_the_page_does() -> None:
+    page, readme = (ROOT / "docs/validation.md").read_text(), (ROOT / "README.md").read_text()
+    compared = rows(page, "Comparison with experiments and other codes")
+    failed = sum("**fail" in row for row in compared)
+    assert f"at least one in {failed} of the {len(compared)} [comparisons" in readme
+    assert f"and {len(rows(page, 'Other checks that fail'))} [other checks]" in readme
+
+
 def parts_of_decks() -> dict[str, list[str]]:
     """The words in backticks in each row of the table of parts of decks, by the part."""
     page = (ROOT / "docs/how-to/cases.md").read_text(encoding="utf-8")
