@@ -35,7 +35,7 @@ from .cli_output import check_places, progress, provenance, say
 from .contacts import ContactColumnsError
 from .dumps.frames import ColumnsError, DensityError, DumpError, DumpWarning
 from .grains import GrainFrame
-from .sources import Source, frames_at, mean_diameter, open_source, select
+from .sources import Sizes, Source, frames_at, open_source, select
 from .style import SEQUENTIAL
 from .walls import Inclusion, Wall
 from .walls.run import WallLoads, wall_lines
@@ -172,7 +172,7 @@ def walls(
     check_places(out, paraview, plot=plot, read=(source, contacts))
     opened = _opened(source, contacts, time_step, density, columns, contact_columns, units)
     chosen = select(opened, frame_numbers(frames, len(opened.grains)))
-    loads, diameters, written = WallLoads(wall or (), chosen), [], []
+    loads, sizes, written = WallLoads(wall or (), chosen), Sizes(), []
     if not loads.walls:
         known = ", ".join(chosen.first.wall_forces) or "none"
         raise DembarkError("no wall is given", "; ".join([f"walls in the dump: {known}", *loads.notes]),
@@ -182,7 +182,7 @@ def walls(
         for grains, touching in opened.frames(chosen.numbers):
             loads.check(grains)
             loads.add(grains, touching, opened.time(grains))
-            diameters += mean_diameter(grains)
+            sizes.add(grains)
             advance()
     results, about = loads.results(), provenance("walls", source)
     if out:
@@ -200,7 +200,7 @@ def walls(
         from .plots import save, wall_figures
 
         written += save(plot, {name: figure for one in results for name, figure in wall_figures(one).items()})
-    say([*chosen.averaging_notes(), *chosen.lines(diameters), *loads.mesh_notes(), *(f"note: {one}; add --wall" for one in loads.notes),
+    say([*chosen.averaging_notes(sizes), *chosen.lines(sizes), *loads.mesh_notes(), *(f"note: {one}; add --wall" for one in loads.notes),
           *(line for one in results for line in wall_lines(one, opened)), *(f"written: {path}" for path in written)])
 
 
@@ -345,7 +345,7 @@ def render(
                 file = place if len(numbers) == 1 else place.with_stem(f"{place.stem}-{mark}")
                 written.append(write_atomic(file, drawing.still(image, file.suffix)))
                 advance()
-    say([*chosen.lines([]), *(f"note: {one}" for one in album.notes), *(f"written: {path}" for path in written)])
+    say([*chosen.lines(), *(f"note: {one}" for one in album.notes), *(f"written: {path}" for path in written)])
 
 
 def _opened(source: Path, contacts: Path | None, time_step: float | None, density: float | None, columns: str | None,
@@ -400,7 +400,7 @@ def tracks(
         chosen = select(opened, frame_numbers(frames, len(opened.grains)))
         with progress("tracks", len(chosen.numbers)) as advance:
             found = tracking.follow(chosen, ids, advance)
-        notes = [*(f"note: {one}" for one in found.notes), *chosen.lines([])]
+        notes = [*(f"note: {one}" for one in found.notes), *chosen.lines()]
     seen = [found] if measured is None else tracking.common(found, measured)
     time, ends = interval or (measured.interval if measured else None), between or tracking.usual_lags(*seen)
     movements = {one.name: tracking.measure(one, time, ends) for one in seen}

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dembark.common.errors import DembarkError
 from dembark.common.files import read_json
@@ -19,6 +20,8 @@ from .dumps import DumpError
 from .dumps.frames import cell
 from .grains import GrainFrame, GrainsDump
 from .walls import CylinderWall, Motion, PlaneWall, Wall
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -151,6 +154,25 @@ def _run_folder(path: Path) -> Path | None:
     raise DembarkError(f"{path} has no grains.dump", "", advice)
 
 
+@dataclass
+class Sizes:
+    """What may change from frame to frame: mean `diameters` (m) of the grains in each that has some, and whether a periodic edge of the box
+    did (`reshaped`)."""
+
+    diameters: list[float] = field(default_factory=list)
+    reshaped: bool = False
+    _edges: Array | None = None
+
+    def add(self, frame: GrainFrame) -> None:
+        """Take the next frame."""
+        self.diameters += mean_diameter(frame)
+        edges = cell(frame.low, frame.high, frame.tilt)
+        if self._edges is None:
+            self._edges = edges
+        change = np.abs(edges - self._edges)[frame.periodic]
+        self.reshaped = self.reshaped or bool(change.max(initial=0.0) > 1e-6 * self._edges.max())
+
+
 @dataclass(frozen=True)
 class Selection:
     """Frames of a source by their `numbers`, the `first` of them that has grains, and the mean `diameter` (m) of that."""
@@ -165,29 +187,29 @@ class Selection:
         """The first frame and the last one, with grains or without."""
         return self.source.grains[self.numbers[0]], self.source.grains[self.numbers[-1]]
 
-    def averaging_notes(self) -> list[str]:
-        """Lines about what makes a mean over the frames another than that over time, or fields wrong at faces of the box."""
+    def averaging_notes(self, sizes: Sizes) -> list[str]:
+        """Lines about what makes a mean over the frames, whose `sizes` are given, another than that over time, or fields wrong at faces of
+        the box."""
         notes, grains = [], self.source.grains
         times = grains.times if np.isfinite(grains.times).all() else grains.steps
         between = np.diff(times[list(self.numbers)])
         if len(between) and np.ptp(between) > 0.01 * between.max():
             unit = "s" if times is grains.times else "steps"
             notes.append(f"note: frames lie {between.min():.4g} to {between.max():.4g} {unit} apart; means are over frames, not over time")
-        begin, end = self.ends
-        edges = cell(begin.low, begin.high, begin.tilt)
-        if np.any(np.abs(cell(end.low, end.high, end.tilt) - edges)[begin.periodic] > 1e-6 * edges.max()):
+        if sizes.reshaped:
             notes.append("note: the periodic box changes its shape; velocities, and powers of contacts across its faces, lack the speed of "
                          "one face past the other, and fields are wrong up to a kernel's width from these")
         return notes
 
-    def lines(self, diameters: Sequence[float]) -> list[str]:
-        """What was read; `diameters` (m) are the mean ones of the frames."""
+    def lines(self, sizes: Sizes | None = None) -> list[str]:
+        """What was read; `sizes` of the frames, where all were."""
         source, numbers = self.source, self.numbers
         first, last = (int(source.grains.steps[number]) for number in (numbers[0], numbers[-1]))
         begin, end = map(source.time, self.ends)
         when = f"{begin:.6g} to {end:.6g} s" if source.timed else "times are steps: give --time-step"
         count = f"frame {numbers[0]}" if len(numbers) == 1 else f"{len(numbers)} frames, {numbers[0]} to {numbers[-1]}"
-        low, high = 1e3 * min(diameters, default=self.diameter), 1e3 * max(diameters, default=self.diameter)
+        diameters = sizes.diameters if sizes and sizes.diameters else [self.diameter]
+        low, high = 1e3 * min(diameters), 1e3 * max(diameters)
         changes = f"the mean diameter of the frames is {low:.4g} to {high:.4g} mm; d is that of the first with grains"
         return [*(f"note: {one}" for one in (*source.notes, *([changes] if high > 1.01 * low else []))),
                 f"{count} of {len(source.grains)}; steps {first} to {last}, {when}; mean diameter d = {1e3 * self.diameter:.4g} mm"]

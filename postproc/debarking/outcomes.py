@@ -31,6 +31,7 @@ class Load:
     least_speed : m/s, approach from which a contact is an impact
     stiffness : N/m, of a log's surface; NaN: unknown, and no wood loss
     radius : m, of the drum; NaN: unknown, and no bound of the forces
+    name : in messages
     """
 
     impacts: Impacts
@@ -41,6 +42,7 @@ class Load:
     least_speed: float = 0.0
     stiffness: float = math.nan
     radius: float = math.nan
+    name: str = ""
 
     @property
     def bound(self) -> float:

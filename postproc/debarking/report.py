@@ -14,6 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from dembark.common.errors import DembarkError
+
 from ..output.netcdf import cf_dataset, variable, with_interval
 from ..resampling import pooled
 from ..statistics import Estimate, over_replicas
@@ -35,8 +37,23 @@ LABELS = {
 }
 
 
+def check_alike(results: Sequence[Outcome]) -> None:
+    """DembarkError where loads that are taken together differ in the period of the drum or in the number of revolutions."""
+    first = results[0]
+    name, period, turns = first.load.name or "load 1", first.load.period, first.revolutions
+    for number, one in enumerate(results[1:], start=2):
+        other = one.load.name or f"load {number}"
+        if not math.isclose(one.load.period, period, rel_tol=1e-9):
+            raise DembarkError(f"{other} is of a drum with {one.load.period:.6g} s a revolution, {name} of one with {period:.6g} s", "",
+                               "compare them with --against, or name them in separate calls")
+        if len(one.revolutions) != len(turns):
+            raise DembarkError(f"{other} has {one.revolutions[-1]:.6g} revolutions, {name} has {turns[-1]:.6g}", "",
+                               f"give --end {min(result.load.end for result in results):.12g}, or name them in separate calls")
+
+
 def pooled_values(results: Sequence[Outcome]) -> dict[str, Estimate]:
-    """Each value over the loads."""
+    """Each value over the loads, which must be alike."""
+    check_alike(results)
     return {name: pooled([one.values for one in results], name) for name in results[0].values}
 
 
@@ -68,31 +85,37 @@ def lines(results: Sequence[Outcome]) -> list[str]:
 
 
 def dataset(results: Sequence[Outcome], **attributes: str | float) -> xarray.Dataset:
-    """Degree of debarking over time of each load, and doses of each log and sector, (load, log, sector), of loads of equal numbers of logs.
-    The logs are in the order of their ids."""
-    first = results[0]
-    count = min(len(one.load.logs.ids) for one in results)
-    spans = min(len(one.revolutions) for one in results)
+    """Degree of debarking over time of each load, and doses of each log and sector, (load, log, sector). The logs are in the order of their
+    ids; where a load has fewer logs than another, NaN follow."""
+    first, means = results[0], pooled_values(results)
     dimensions = ("load", "log", "sector")
 
     def table(name: str) -> Array:
-        return np.array([getattr(one.doses, name).sum(axis=0)[:count] for one in results])
+        return _padded([getattr(one.doses, name).sum(axis=0) for one in results])
 
     variables = {
-        "degree": variable(("load", "revolutions"), [one.degree[:spans] for one in results], "1", "degree of debarking"),
+        "degree": variable(("load", "revolutions"), [one.degree for one in results], "1", "degree of debarking"),
         "useful_impacts": variable(dimensions, table("useful"), "1", "impacts with a peak force in the range"),
         "damaging_impacts": variable(dimensions, table("damaging"), "1", "impacts with a peak force above the range"),
         "friction_work": variable(dimensions, table("friction"), "J", "energy lost by friction on the log"),
-        "radius": variable(("load", "log"), [one.load.logs.radii[:count] for one in results], "m", "radius of the log"),
-        "mass": variable(("load", "log"), [one.load.logs.masses[:count] for one in results], "kg", "mass of the log"),
+        "radius": variable(("load", "log"), _padded([one.load.logs.radii for one in results]), "m", "radius of the log"),
+        "mass": variable(("load", "log"), _padded([one.load.logs.masses for one in results]), "kg", "mass of the log"),
     }
-    for name, estimate in pooled_values(results).items():
+    for name, estimate in means.items():
         variables |= with_interval(f"mean_{name}", ("mean",), [estimate], "1", f"{LABELS[name][0]}, in SI units")
     sectors = first.doses.useful.shape[2]
-    coordinates = {"revolutions": variable(("revolutions",), first.revolutions[:spans], "1", "revolutions from the begin of the window"),
+    coordinates = {"revolutions": variable(("revolutions",), first.revolutions, "1", "revolutions from the begin of the window"),
                    "sector": variable(("sector",), (np.arange(sectors) + 0.5) * 360.0 / sectors, "degree", "angle in the log's own frame")}
     return cf_dataset(variables, coordinates, bark_force=first.forces.bark, wood_force=first.forces.wood, period=first.load.period,
                       **attributes)
+
+
+def _padded(rows: Sequence[Array]) -> Array:
+    """Arrays of one row for each log as one array (loads, logs, ...), with NaN after the last log of a load."""
+    found = np.full((len(rows), max(map(len, rows)), *rows[0].shape[1:]), np.nan)
+    for place, one in zip(found, rows, strict=True):
+        place[: len(one)] = one
+    return found
 
 
 def against(groups: Mapping[float, Sequence[Outcome]], label: str) -> Figure:
@@ -130,7 +153,9 @@ def against(groups: Mapping[float, Sequence[Outcome]], label: str) -> Figure:
 
 
 def figures(results: Sequence[Outcome]) -> dict[str, Figure]:
-    """Degree of debarking against revolutions and residence time; doses around the logs and by diameter; peak forces."""
+    """Degree of debarking against revolutions and residence time; doses around the logs and by diameter; peak forces. Of loads that are
+    alike."""
+    check_alike(results)
     with matplotlib.rc_context(STYLE):
         found = {"doses": _doses(results), "forces": _forces(results)}
         if results[0].law is not None:

@@ -65,7 +65,7 @@ def load_of(file: Path, given: Given) -> Load:
     if end - begin < 0.25 * period:
         raise DembarkError(f"the window of {file} from {begin:g} to {end:g} s is less than a quarter of a revolution ({period:.3g} s)")
     return Load(_counted(impacts, record), _logs(file, given), begin, end, period, given.least_speed, given.stiffness,
-                given.radius)
+                given.radius, str(file))
 
 
 def parameter(file: Path, name: str) -> float:

@@ -93,32 +93,46 @@ class Entry:
     units: str = ""
 
 
-def kept_entries(entries: Sequence[Entry]) -> tuple[list[Entry], str]:
-    """The frames in the order of their steps; and one line about what that changed, or "".
+def _resumed(own: Sequence[int], other: Sequence[int]) -> bool:
+    """Whether a file with the steps `own` is of a run that was resumed between the steps `other` of a file before it. Files that were
+    written in turn begin and end within one frame of each other."""
+    if not other or not other[0] < own[0] < other[-1]:
+        return False
+    in_turn = other[1] > own[0] and other[-2] < own[-1] and (len(own) < 2 or own[-2] < other[-1])
+    return not in_turn
+
+
+def kept_entries(entries: Sequence[Entry]) -> tuple[list[Entry], Entry | None]:
+    """The frames in the order of their steps, and the first one that stood at another place.
 
     A frame whose step was there before, or that goes back to a step between others of its file, is of a run that was resumed at an earlier
-    state: it replaces that frame, and all later ones of the run before. Parts of a run that were only joined in another order begin
-    before all others of the file.
+    state: it replaces that frame, and all later ones of the run before. So does the first frame of a file whose step lies between those of
+    a file before, unless both were written in turn. Parts of a run that were only joined in another order begin before all others of the
+    file.
     """
-    back = [other for one, other in itertools.pairwise(entries) if other.step <= one.step]
-    if not back:
-        return list(entries), ""
+    back = next((other for one, other in itertools.pairwise(entries) if other.step <= one.step), None)
+    if back is None:
+        return list(entries), None
+    steps: dict[int, list[int]] = {}
+    for entry in sorted(entries, key=lambda entry: (entry.file, entry.step)):
+        steps.setdefault(entry.file, []).append(entry.step)
+    spans = {file: own for file, own in steps.items() if len(own) > 1}
     kept: dict[int, Entry] = {}
     before: Entry | None = None
     least = 0
     for entry in sorted(entries, key=lambda entry: (entry.file, entry.number)):
+        own = steps[entry.file]
         if before is None or before.file != entry.file:
             least = entry.step
+            around = [file for file, other in spans.items() if file < entry.file and other[0] < own[0] < other[-1]]
+            if any(_resumed(own, [step for step in spans[file] if step in kept and kept[step].file == file]) for file in around):
+                kept = {step: one for step, one in kept.items() if step < own[0]}
         elif least < entry.step < before.step:
             kept = {step: one for step, one in kept.items() if step < entry.step or one.file != entry.file}
         if entry.step in kept:
             kept = {step: one for step, one in kept.items() if step < entry.step}
         kept[entry.step], before, least = entry, entry, min(least, entry.step)
-    dropped = len(entries) - len(kept)
-    said = f"steps go back in frame {back[0].number}; frames were sorted by step"
-    if dropped:
-        said += f", {dropped} that a resumed run replaces {'were' if dropped > 1 else 'was'} left out"
-    return [kept[step] for step in sorted(kept)], said
+    return [kept[step] for step in sorted(kept)], back
 
 
 class Dump(ABC):
@@ -156,10 +170,14 @@ class Dump(ABC):
         self.truncated, self.remarks = "", ()
         for entry in faulty:
             self._cut_off(f"{self._where(entry)}: {entry.fault}")
-        kept, said = kept_entries([entry for entry in found if not entry.fault])
+        sound = [entry for entry in found if not entry.fault]
+        kept, back = kept_entries(sound)
         self._check_times(found, kept)
-        if said:
-            self.remarks += (f"{self.path}: {said}",)
+        if back:
+            said = f"{self._file(back)}: steps go back in frame {back.number}; frames were sorted by step"
+            if dropped := len(sound) - len(kept):
+                said += f", {dropped} that a resumed run replaces {'were' if dropped > 1 else 'was'} left out"
+            self.remarks += (said,)
             warnings.warn(self.remarks[-1], DumpWarning, stacklevel=3)
         if 0 < (without := sum(entry.time is None for entry in kept)) < len(kept):
             self.remarks += (f"{self.path}: {without} of {len(kept)} frames have no ITEM: TIME",)
@@ -186,8 +204,11 @@ class Dump(ABC):
                     raise DumpError(f"{self._where(other)}: its step is {other.step} at time {time:.9g}, after step {one.step} at time "
                                     f"{before:.9g}; write what follows a reset of the steps into a file of its own")
 
+    def _file(self, entry: Entry) -> Path:  # noqa: ARG002 - a series has several
+        return self.path
+
     def _where(self, entry: Entry) -> str:
-        return f"{self.path}, frame {entry.number}"
+        return f"{self._file(entry)}, frame {entry.number}"
 
     def _cut_off(self, said: str) -> None:
         """A frame is not complete: refuse it, or note that it is left out."""

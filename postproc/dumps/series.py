@@ -54,8 +54,8 @@ class SeriesDump(Dump):
         self._files = listed(path)
         super().__init__(self._files[0], skip_truncated=skip_truncated, stream=stream, units=units)
 
-    def _where(self, entry: Entry) -> str:
-        return f"{self._files[entry.file]}, frame {entry.number}"
+    def _file(self, entry: Entry) -> Path:
+        return self._files[entry.file]
 
     def _find(self) -> Iterator[Entry]:
         files: dict[tuple[int, ...], Path] = {}

@@ -22,7 +22,7 @@ from ..cli_options import counts, length, span
 from ..contacts import ContactFrame
 from ..grains import GrainFrame
 from ..output.netcdf import dataset, joined
-from ..sources import Selection, mean_diameter
+from ..sources import Selection, Sizes
 from ..walls import Inclusion, wall_contacts
 from ..walls.run import WallLoads, wall_lines
 from ..walls.stress import WallStress
@@ -87,7 +87,7 @@ class FieldAverages:
         self.momentum_error, self.seen = 0.0, 1.0
         self.unplaced: list[str] = []
         self.walled = self.bounded = False
-        self.diameters: list[float] = []
+        self.sizes = Sizes()
         self.last: FieldSet | None = None
 
     def run(self, done: Callable[[GrainFrame, float], None] = lambda _frame, _time: None) -> xarray.Dataset:
@@ -126,7 +126,7 @@ class FieldAverages:
             walls = [one.wall for one in self.walls.walls]
             yield grains, contacts, [wall_contacts(grains, one, time) for one in walls if not isinstance(one, Inclusion)]
             sample.add(grains, time)
-            self.diameters += mean_diameter(grains)
+            self.sizes.add(grains)
             self.walls.add(grains, contacts, time)
             done(grains, time)
 
@@ -164,7 +164,7 @@ class FieldAverages:
 
     def summary(self) -> list[str]:
         """What was computed and checked, in lines."""
-        lines = [*self.chosen.averaging_notes(), *self.chosen.lines(self.diameters), *self.walls.mesh_notes()]
+        lines = [*self.chosen.averaging_notes(self.sizes), *self.chosen.lines(self.sizes), *self.walls.mesh_notes()]
         if self.left_over:
             lines.append(f"note: the last {self.left_over} frames do not fill a group and were left out")
         size = " × ".join(f"{1e3 * one:.4g}" for one in self.grid.spacing)

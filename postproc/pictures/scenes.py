@@ -17,6 +17,7 @@ from dembark.common.units import to_si
 
 from ..contacts import ContactFrame
 from ..dumps import DumpError
+from ..fields.coarse_graining import WallContacts
 from ..grains import GrainFrame
 from ..history import read_times
 from ..render import Colours, Renderer, Scene, Sheet, Surface, View
@@ -94,14 +95,20 @@ class Album:
         own, notes = self.source.walls([name for name, wall in record.items() if wall["kind"] != "box"])
         self.notes += notes
         steps = self.source.grains.steps[list(self.numbers)]
-        # All walls press on grains, drawn or not.
-        self.known: list[Wall] = [*own, *self.walls]
-        meshes = self._meshes(steps) if self.look.walls and self.folder else []
+        # All walls press on grains, drawn or not; those of the user replace the run's own of the same name.
+        given = {wall.name for wall in self.walls}
+        self.known: list[Wall] = [*(wall for wall in own if wall.name not in given), *self.walls]
+        self.meshes = self._meshes(steps) if self.folder and (self.look.walls or self.name == "pressure") else {}
+        meshes = list(self.meshes.values()) if self.look.walls else []
         bodies = water.boxes(self.folder, record, steps) if self.folder else {}
         self.moving = [Surface(np.zeros((0, 3, 3)), opacity=_WALL, edges=True)] * len(meshes) + [
             Surface(np.zeros((0, 3, 3)), _BODY, edges=True)] * len(bodies)
         self.places = [*meshes, *bodies.values()]
+        self.unplaced: list[str] = []
         self.sheet = self._sheet()
+        if self.unplaced:
+            self.notes.append(f"the position of the wall {', '.join(self.unplaced)} is unknown; its part of the pressure is missing, "
+                              "add --wall")
 
     def __iter__(self) -> Iterator[tuple[float, NDArray[np.uint8]]]:
         """Time (s; NaN: unknown) and picture (height, width, 3) of each frame."""
@@ -115,14 +122,14 @@ class Album:
             return next(iter(self.source.frames([number])))
         return self.source.grains[number], None
 
-    def _meshes(self, steps: NDArray[np.int64]) -> list[Array]:
-        """Triangles (steps, t, 3, 3) in m of the meshes of the run at each step: at rest, or moved by the columns motion_x, ... of its
-        history. Meshes that do no work while another does are at rest. Meshes that turn are left out, for the history does not say about
-        which axis."""
+    def _meshes(self, steps: NDArray[np.int64]) -> dict[str, Array]:
+        """Triangles (steps, t, 3, 3) in m of the meshes of the run by name, at each step: at rest, or moved by the columns motion_x, ... of
+        its history. Meshes that do no work while another does are at rest. Meshes that turn are left out, for the history does not say
+        about which axis."""
         assert self.folder
         files = sorted(self.folder.glob("*.stl"))
         if not files:
-            return []
+            return {}
         try:
             rows = read_times(self.folder / "time.csv") if (self.folder / "time.csv").is_file() else {}
         except DumpError as error:
@@ -130,12 +137,13 @@ class Album:
             rows = {}
         if np.abs(rows.get("motion_angle", np.zeros(1))).max() > 0.0:
             self.notes.append(f"the walls {', '.join(file.stem for file in files)} turn; they are not drawn")
-            return []
+            return {}
         way = np.column_stack([np.interp(steps, rows["step"], rows[f"motion_{axis}"]) if "motion_x" in rows else np.zeros(len(steps))
                                for axis in "xyz"])
         working = {name.removesuffix("_work") for name, column in rows.items() if name.endswith("_work") and column.any()}
         resting = {file for file in files if working and f"{file.stem}_work" in rows and file.stem not in working}
-        return [np.asarray(read_stl(file).triangles)[None] + (0.0 if file in resting else 1.0) * way[:, None, None, :] for file in files]
+        return {file.stem: np.asarray(read_stl(file).triangles)[None] + (0.0 if file in resting else 1.0) * way[:, None, None, :]
+                for file in files}
 
     def _sheet(self) -> Sheet:
         """Everything that is in any frame, and the colour scale of all of them."""
@@ -143,7 +151,7 @@ class Album:
         flat, sample, ends = self.view.extent(np.zeros((0, 3))), None, []
         kinds: set[int] = set()
         self.middle = np.inf
-        for number in self.numbers:
+        for row, number in enumerate(self.numbers):
             frame, contacts = self._read(number)
             frame = frame.select(self._shown(frame))
             near = _together(frame.wrapped)
@@ -151,7 +159,7 @@ class Album:
             corners = _joined(corners, _SPACE.extent(places, reach))
             flat = _joined(flat, self.view.extent(places, reach))
             if self.name:
-                sample = self._quantity(frame, contacts, self._time(frame.step, number))
+                sample = self._quantity(frame, contacts, row)
                 values = sample.values[np.isfinite(sample.values)]
                 ends += [np.percentile(values, [2.0, 98.0])] if len(values) else []
                 kinds |= set(np.unique(values).astype(int).tolist()) if sample.kinds else set()
@@ -194,14 +202,21 @@ class Album:
         label = first.label if unit in ("", "1") else f"{first.label} / {f'({unit})' if set(unit) & set('/*^ ') else unit}"
         return Colours(label, low, high if high > low else low + 1.0, name=look.colours)
 
-    def _quantity(self, frame: GrainFrame, contacts: ContactFrame | None, time: float) -> Quantity:
-        """What the grains are coloured by at `time` (s); NaN of glued ones."""
-        pressing = self._standing(time) if self.name == "pressure" else []
-        walls = [wall_contacts(frame, wall) for wall in pressing if wall.name in frame.wall_forces]
-        found = quantity(self.name, frame, contacts, walls)
+    def _quantity(self, frame: GrainFrame, contacts: ContactFrame | None, row: int) -> Quantity:
+        """What the grains of the frame that is `row` among the chosen ones are coloured by; NaN of glued ones."""
+        found = quantity(self.name, frame, contacts, self._pressing(frame, row) if self.name == "pressure" else [])
         if found.kinds or not self._cased(frame):
             return found
         return replace(found, values=np.where(frame.types == _GLUED, np.nan, found.values))
+
+    def _pressing(self, frame: GrainFrame, row: int) -> list[WallContacts]:
+        """What walls do to grains; those that push but whose place is not known become `unplaced`."""
+        standing = {wall.name: wall for wall in self._standing(self._time(frame.step, self.numbers[row]))}
+        # A mesh without forces of its own may be a part of a wall that is called like another one.
+        if self.meshes.keys() <= frame.wall_forces.keys():
+            standing = {name: MeshWall(name, places[row]) for name, places in self.meshes.items()} | standing
+        self.unplaced += [name for name, forces in frame.wall_forces.items() if name not in {*standing, *self.unplaced} and forces.any()]
+        return [wall_contacts(frame, wall) for name, wall in standing.items() if name in frame.wall_forces]
 
     def _cased(self, frame: GrainFrame) -> bool:
         """Whether types are those of cases."""
@@ -220,7 +235,7 @@ class Album:
         shown = self._shown(frame) & (frame.wrapped @ self.view.axes[2] <= self.middle)
         scale = self.sheet.colours
         time = self._time(frame.step, self.numbers[row])
-        values = self._quantity(frame, contacts, time).values / self.factor if scale else None
+        values = self._quantity(frame, contacts, row).values / self.factor if scale else None
         surfaces = [*(replace(look, triangles=place[row]) for look, place in zip(self.moving, self.places, strict=True)),
                     *self._walls(time)]
         plain = np.tile(np.asarray(_rgb(_WATER), np.uint8), (len(frame.ids), 1))

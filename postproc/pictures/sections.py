@@ -21,6 +21,7 @@ from dembark.common.files import read_json
 
 from .. import DumpError, GrainFrame, GrainsDump
 from ..dumps import TextDump
+from ..dumps.frames import less_edges
 from ..history import read_times
 from ..render import pixels, write_film
 from ..style import GREY, SEQUENTIAL, STYLE
@@ -119,12 +120,15 @@ def _walls(folder: Path, steps: list[int]) -> Array:
 
 def _chains(folder: Path, frame: GrainFrame, axes: list[int]) -> tuple[Array, Array]:
     """Ends (m, 2, 2) in m and normal forces (m,) in N of the contacts in the last frame of contacts.dump: from log to log, or to the
-    wall."""
+    wall, or to the contact where the other log is drawn at the other side of a periodic box."""
     dump = TextDump(folder / "contacts.dump")
     values = dump.frame(len(dump) - 1).values
-    place = {int(number): row for number, row in zip(frame.ids, frame.positions[:, axes], strict=True)}
-    ends = [(place[int(row[0])], place.get(int(row[1]), row[[10 + axis for axis in axes]])) for row in values]
-    return np.array(ends).reshape(len(ends), 2, 2), values[:, 6]
+    place = dict(zip(frame.ids.tolist(), frame.wrapped, strict=True))
+    first = np.array([place[int(one)] for one in values[:, 0]]).reshape(-1, 3)
+    contact = first + less_edges(values[:, 10:13] - first, frame)
+    way = np.array([place.get(int(one), end) for one, end in zip(values[:, 1], contact, strict=True)]).reshape(-1, 3) - first
+    across = (less_edges(way, frame) != way).any(axis=1)
+    return np.stack([first, np.where(across[:, None], contact, first + way)], axis=1)[..., axes], values[:, 6]
 
 
 def picture(section: Section) -> bytes:

@@ -107,10 +107,10 @@ def test_means_over_uneven_frames_and_over_a_sheared_box_are_no_surprise(tmp_pat
     monkeypatch.chdir(tmp_path)
     place, floor, *_ = packing()
 
-    def said(steps, command, shear=0.0):
+    def said(steps, command, shear=lambda step: 0.0):
         text = ""
         for step in steps:
-            tilt = 1e-5 * shear * step
+            tilt = 1e-3 * shear(step)
             bounds = f"xy xz yz pp pp ff\n0 {0.04 + tilt} {tilt}\n0 0.04 0\n0 0.06 0\n"
             head, _, rest = grains_text(step, place, np.full(64, RADIUS), walls={"base": floor}).partition("ITEM: ATOMS")
             text += f"{head.partition('ITEM: BOX')[0]}ITEM: BOX BOUNDS {bounds}ITEM: ATOMS{rest}"
@@ -124,8 +124,11 @@ def test_means_over_uneven_frames_and_over_a_sheared_box_are_no_surprise(tmp_pat
     for command in (grid, []):
         assert "apart" not in said((0, 100, 200), command)
         assert "note: frames lie 10 to 100 steps apart; means are over frames, not over time" in said((0, 100, 110), command)
-    assert "changes its shape" not in said((0, 100), grid)
-    assert "note: the periodic box changes its shape" in said((0, 100), grid, shear=1.0)
+    for command in (grid, []):
+        assert "changes its shape" not in said((0, 100), command)
+        for cycles in (0.5, 1.0):  # after a complete one, only the frames between the ends are sheared
+            sheared = said((0, 25, 50, 75, 100), command, lambda step, cycles=cycles: np.sin(0.01 * np.pi * cycles * step) ** 2)
+            assert "note: the periodic box changes its shape" in sheared
 
 
 def test_averages_by_cell_mask_thin_cells(run, capsys):

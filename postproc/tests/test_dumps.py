@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from dembark import _dumps
@@ -193,6 +193,38 @@ def test_a_run_resumed_between_two_frames_replaces_what_follows(write):
     with pytest.warns(DumpWarning, match="steps go back in frame 5; frames were sorted by step, 2 that a resumed run replaces"):
         dump = TextDump(path)
     assert dump.steps.tolist() == [0, 10, 15, 25, 35] and [len(one.values) for one in dump] == [3, 3, 1, 1, 1]
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(given_up=st.lists(st.integers(0, 200), min_size=3, max_size=9, unique=True).map(sorted), state=st.integers(0, 200),
+       spacing=st.integers(1, 40), count=st.integers(1, 9))
+def test_a_resumed_run_in_a_file_of_its_own_replaces_what_follows(write, given_up, state, spacing, count):
+    """Whether or not it has a step of the run before."""
+    assume(given_up[1] <= state < given_up[-1])
+    resumed = [state + spacing * number for number in range(count)]
+    files = [write(*map(plain, given_up), name="1.dump"), write(*(plain(step, 2) for step in resumed), name="2.dump")]
+    left = [step for step in given_up if step < state]
+    with pytest.warns(DumpWarning, match=f"2.dump: steps go back in frame 1; .* {len(given_up) - len(left)} that a resumed run replaces"):
+        dump = open_dump(files)
+    assert dump.steps.tolist() == left + resumed and dump.counts.tolist() == [3] * len(left) + [2] * count
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.integers(0, 200), min_size=2, max_size=24, unique=True).map(sorted), st.integers(2, 4), st.booleans(), st.randoms())
+def test_frames_dealt_to_files_in_turn_or_in_parts_are_all_there(tmp_path, steps, count, turns, order):
+    """One after another to each of the files, or in parts whose files have any names; one frame each, too."""
+    size = -(-len(steps) // count)
+    parts = [part for number in range(count) if (part := steps[number::count] if turns else steps[number * size:(number + 1) * size])]
+    names = list(range(len(parts)))
+    order.shuffle(names)
+    files = []
+    for name, part in zip(names, parts, strict=True):
+        files.append(tmp_path / f"{name}.dump")
+        files[-1].write_text("".join(map(plain, part)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        dump = open_dump(files)
+    assert dump.steps.tolist() == steps and "replace" not in str(dump.remarks)
 
 
 @pytest.mark.parametrize(("cut", "skip"), [(5, False), (9, False), (12, False), (27, True), (32, True), (60, True)])

@@ -118,7 +118,7 @@ def test_types_are_kinds_and_glued_grains_grey(run):
     assert near.sheet.colours.kinds == ()
     glued = frame_of(PLACE[:2], 0.02)
     glued.types[1] = 2
-    values = near._quantity(glued, None, 0.0).values
+    values = near._quantity(glued, None, 0).values
     assert values[0] == 1.0 and np.isnan(values[1])
 
 

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dumps import contacts_text, grains_text
+from dumps import contacts_text, grains_text, write_times
 
 from dembark.common.errors import DembarkError
 from dembark.postproc.fields.coarse_graining import WallContacts
 from dembark.postproc.pictures.quantities import grain_pressure, quantity, usual
 from dembark.postproc.pictures.scenes import Album, Look
 from dembark.postproc.sources import open_source
+from dembark.postproc.walls import PlaneWall
 from dembark.validation.verification import scenes
 
 
@@ -89,3 +90,58 @@ def test_a_wall_presses_where_it_is_then_drawn_or_not(tmp_path, drawn):
     exact = 3.0 * 0.005 / (4.0 * np.pi * 0.005**3)
     assert album.sheet.colours.high * album.factor == pytest.approx(np.percentile([0.0, exact], 98.0))
     assert len(album._walls(0.05)) == drawn
+
+
+LID = "solid lid" + "".join("\nfacet normal 0 0 -1\nouter loop\n" + "\n".join(f"vertex {x} {y} 0.01" for x, y in corners)
+                            + "\nendloop\nendfacet" for corners in (((0, 0), (0.1, 0), (0.1, 0.1)), ((0, 0), (0.1, 0.1), (0, 0.1))))
+
+
+@pytest.fixture
+def pressed(tmp_path):
+    """Between a floor and the mesh lid.stl that push with 3 N each, a grain of 10 mm, which rises with the lid; pressure in it, Pa."""
+    def text(step, up):
+        places, push = np.array([[0.05, 0.05, 0.005 + up], [0.02, 0.02, 0.08]]), np.array([[0.0, 0.0, 3.0], [0.0, 0.0, 0.0]])
+        return grains_text(step, places, np.full(2, 0.005), walls={"floor": push, "lid": -push}, box=((0.0, 0.1),) * 3)
+
+    (tmp_path / "grains.dump").write_text(text(0, 0.0) + text(100, 0.01))
+    (tmp_path / "contacts.dump").write_text("".join(contacts_text(step, [], [], [], [], box=((0.0, 0.1),) * 3) for step in (0, 100)))
+    (tmp_path / "lid.stl").write_text(LID + "\nendsolid lid\n")
+    motion = dict.fromkeys(("kinetic_energy", "motion_x", "motion_y", "motion_angle"), np.zeros(2)) | {"motion_z": np.array([0.0, 0.01])}
+    write_times(tmp_path / "time.csv", {"step": np.array([0, 100]), "time": np.array([0.0, 0.01]), **motion})
+    floor = {"kind": "plane", "velocity": [0, 0, 1.0]}
+    (tmp_path / "run.json").write_text(json.dumps({"case": "x", "time_step": 1e-4, "walls": {"floor": floor}}))
+    return tmp_path, 2.0 * 3.0 * 0.005 / (4.0 * np.pi * 0.005**3)
+
+
+def pressures(album):
+    """In the grain, in each frame."""
+    return [album._quantity(*album._read(number), row).values[0] for row, number in enumerate(album.numbers)]
+
+
+@pytest.mark.parametrize("drawn", [True, False])
+def test_a_mesh_of_the_run_presses_where_it_is_in_each_frame(pressed, drawn):
+    folder, exact = pressed
+    album = Album(open_source(folder), [0, 1], Look(colour_by="pressure", walls=drawn))
+    np.testing.assert_allclose(pressures(album), [exact, exact], rtol=1e-5)
+    assert album.notes == [] and len(album.places) == drawn
+
+
+def test_walls_without_a_known_place_are_named_and_those_of_the_user_count_once(pressed):
+    folder, exact = pressed
+    (folder / "lid.stl").rename(folder / "other.stl")
+    source, look = open_source(folder), Look(colour_by="pressure")
+    album = Album(source, [0, 1], look)
+    np.testing.assert_allclose(pressures(album), [0.5 * exact] * 2, rtol=1e-5)
+    assert album.notes == ["the position of the wall lid is unknown; its part of the pressure is missing, add --wall"]
+    given = [PlaneWall("lid", (0.0, 0.0, 0.01), (0.0, 0.0, -1.0)), PlaneWall("floor")]
+    np.testing.assert_allclose(pressures(Album(source, [0], look, given)), [exact], rtol=1e-5)
+    assert Album(source, [0], Look()).notes == []
+
+
+def test_one_of_several_meshes_is_not_taken_for_the_wall_of_all(pressed):
+    """The forces of LIGGGHTS are those of one wall, called like its first mesh."""
+    folder, exact = pressed
+    (folder / "side.stl").write_text(LID.replace("0.01", "0.02") + "\nendsolid lid\n")
+    album = Album(open_source(folder), [0], Look(colour_by="pressure"))
+    np.testing.assert_allclose(pressures(album), [0.5 * exact], rtol=1e-5)
+    assert "wall lid is unknown" in album.notes[0]

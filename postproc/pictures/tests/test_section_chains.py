@@ -41,6 +41,20 @@ def test_chains_join_logs_and_reach_to_walls(run: Path) -> None:
     assert wide == pytest.approx(2.0 * narrow)
 
 
+@pytest.mark.parametrize("point", [-1.0, 1.0, 3.0])
+def test_chains_in_a_periodic_box_stay_with_the_logs_that_are_drawn(tmp_path: Path, point: float) -> None:
+    """The first log has gone around twice; it touches the second across the face, a third, and the wall below. A line across the face ends
+    at the contact."""
+    logs = "".join(LOG.format(number, x, 0.1).replace("0 0 0 1", f"{turns} 0 0 1", 1)
+                   for number, x, turns in ((1, 0.9, 2), (2, -0.9, 1), (3, 0.7, -1)))
+    rows = f"1 2 -1 0 0 0 400 0 0 0 {point} 0.1 0\n3 1 -1 0 0 0 300 0 0 0 0.8 0.1 0\n1 -1 0 1 0 0 100 0 0 0 {point - 0.1} 0 0\n"
+    for name, what, body in (("grains", "ATOMS", GRAINS + logs), ("contacts", "ENTRIES", " ".join("abcdefghijklm") + "\n" + rows)):
+        (tmp_path / f"{name}.dump").write_text(HEAD.format(0, what, 3, what).replace("BOUNDS ff", "BOUNDS pp") + body)
+    found = cross_section.scene(tmp_path, "xy", speed=1.0, chains=True)
+    np.testing.assert_allclose(found.places[0, :, 0], [0.9, -0.9, 0.7])
+    np.testing.assert_allclose(found.links, [[[0.9, 0.1], [1.0, 0.1]], [[0.7, 0.1], [0.9, 0.1]], [[0.9, 0.1], [0.9, 0.0]]], atol=1e-12)
+
+
 def test_frames_are_picked_evenly_with_the_last(run: Path) -> None:
     assert cross_section.scene(run, "xy", speed=1.0, frames=3).times.tolist() == [0.0, 5.0, 10.0]
     for count in (0, 11, 50):
