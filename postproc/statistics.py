@@ -51,6 +51,19 @@ def student(degrees: float, confidence: float = CONFIDENCE) -> float:
     return float(stdtrit(degrees, 0.5 + 0.5 * confidence)) if degrees >= 1 else math.inf
 
 
+def variance_half(degrees: float, confidence: float = CONFIDENCE) -> float:
+    """Half-width, over the value, of the symmetric interval of a variance whose value over it is distributed as chi-square with these
+    `degrees` of freedom over them; inf for fewer than four, of which it is more than four times the value."""
+    from scipy.optimize import brentq
+    from scipy.special import chdtr
+
+    def lacks(half: float) -> float:
+        above = chdtr(degrees, degrees / (1.0 - half)) if half < 1.0 else 1.0
+        return float(above - chdtr(degrees, degrees / (1.0 + half))) - confidence
+
+    return float(brentq(lacks, 0.0, 100.0)) if degrees >= 4.0 else math.inf
+
+
 def tail_probability(limit: float, half: float, degrees: float) -> float:
     """Probability that a value with the 95 % half-width `half` lies farther from its mean than `limit`; infinite `degrees`: normal."""
     from scipy.special import ndtr, stdtr

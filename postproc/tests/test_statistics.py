@@ -20,6 +20,7 @@ from dembark.postproc.statistics import (
     steady_start,
     tail_probability,
     time_blocks,
+    variance_half,
 )
 
 
@@ -123,6 +124,13 @@ def test_the_chance_of_a_value_beyond_a_limit_is_that_of_its_interval():
     assert tail_probability(2.0, 2.0, 4.0) == pytest.approx(0.05) == tail_probability(0.3, 0.3, math.inf)
     assert tail_probability(2.0, 1.0, math.inf) == pytest.approx(math.erfc(2.0 * 1.959964 / math.sqrt(2.0)), rel=1e-5)
     assert tail_probability(2.0, 1.0, 2.0) > tail_probability(2.0, 1.0, 9.0) > tail_probability(2.0, 1.0, math.inf)
+
+
+@pytest.mark.parametrize("degrees", [4.0, 9.5, 200.0])
+def test_the_interval_of_a_variance_holds_it_in_95_percent(degrees):
+    found = np.random.default_rng(14).chisquare(degrees, 20000) / degrees
+    assert np.mean(np.abs(found - 1.0) <= found * variance_half(degrees)) == pytest.approx(0.95, abs=0.005)
+    assert variance_half(3.9) == math.inf
 
 
 @pytest.mark.parametrize("length", [50, 120])
