@@ -288,7 +288,7 @@ def follow(chosen: Selection, ids: Sequence[int] | None = None, advance: Callabl
         at = np.minimum(np.searchsorted(grains.ids, wanted), max(len(grains.ids) - 1, 0))
         there = grains.ids[at] == wanted if len(grains.ids) else np.zeros(len(wanted), bool)
         row = at[there]
-        places[number, there] = joined(grains, row, there, times[number] - times[max(number - 1, 0)])
+        places[number, there] = joined(grains, row, there, times[number])
         for name, values in _columns(grains, contacts).items():
             columns.setdefault(name, np.full(shape, np.nan))[number, there] = values[row]
         advance()
@@ -304,30 +304,30 @@ class _Joined:
     """Positions without the jumps at the faces of a periodic box."""
 
     def __init__(self, count: int) -> None:
-        self.last = np.full((count, 3), np.nan)
-        self.farthest = 0.0  # by the velocities, from frame to frame, in periods
+        self.last, self.time = np.full((count, 3), np.nan), np.full(count, np.nan)  # place (m) and time (s) of each when it was last seen
+        self.farthest = 0.0  # by the velocities since then, in periods
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A line where a grain moved half a period or more from frame to frame."""
-        note = (f"by their velocities grains move up to {self.farthest:.2g} periods from frame to frame, and the dump has no image flags: "
-                "tracks may be wrong by periods; dump ix iy iz, or more frames")
+        """A line where a grain moved half a period or more from one frame that has it to the next."""
+        note = (f"by their velocities grains move up to {self.farthest:.2g} periods from one frame that has them to the next, and the dump "
+                "has no image flags: tracks may be wrong by periods; dump ix iy iz, or more frames")
         return (note,) if self.farthest >= 0.5 else ()
 
-    def __call__(self, grains: GrainFrame, row: NDArray[np.intp], there: NDArray[np.bool_], interval: float) -> Array:
-        """Those of the grains in these rows of a frame, which are those of the tracks that `there` (n,) marks, `interval` (s) after the
-        frame before."""
+    def __call__(self, grains: GrainFrame, row: NDArray[np.intp], there: NDArray[np.bool_], time: float) -> Array:
+        """Those of the grains in these rows of a frame at `time` (s), which are those of the tracks that `there` (n,) marks."""
         places = grains.positions[row]
         if grains.periodic.any() and not grains.unwrapped:
             # A box of a plane layer may have no thickness, where it is not periodic.
             flat = ~grains.periodic & ~(grains.high > grains.low)
             edges, before = cell(grains.low, np.where(flat, grains.low + 1.0, grains.high), grains.tilt), self.last[there]
             if grains.has("velocities"):
-                moves = np.linalg.solve(edges.T, interval * grains.velocities[row].T)[grains.periodic]
+                away = np.nan_to_num(time - self.time[there])
+                moves = np.linalg.solve(edges.T, away * grains.velocities[row].T)[grains.periodic]
                 self.farthest = max(self.farthest, float(np.abs(moves).max(initial=0.0)))
             periods = np.where(grains.periodic, np.round(np.linalg.solve(edges.T, (places - before).T).T), 0.0)
             places = places - np.nan_to_num(periods) @ edges
-        self.last[there] = places
+        self.last[there], self.time[there] = places, time
         return places
 
 

@@ -191,15 +191,17 @@ def test_a_plane_layer_may_have_a_box_without_thickness(tmp_path):
     assert found.positions[:, 0, 0] == pytest.approx([0.75, 1.05, 1.35]) and not found.positions[:, 0, 1].any()
 
 
-@pytest.mark.parametrize(("image_flags", "frames", "noted"), [(False, 30, True), (False, 120, False), (True, 30, False)])
-def test_a_note_says_where_grains_pass_half_a_period_between_frames(tmp_path, monkeypatch, capsys, image_flags, frames, noted):
-    """0.5 m/s over 1.5 ms or 0.375 ms in a period of 1 mm."""
+@pytest.mark.parametrize(("image_flags", "frames", "absent", "noted"), [
+    (False, 30, 0, True), (False, 120, 0, False), (True, 30, 0, False), (False, 120, 3, True), (True, 120, 3, False)])
+def test_a_note_says_where_grains_pass_half_a_period_between_frames(tmp_path, monkeypatch, capsys, image_flags, frames, absent, noted):
+    """0.5 m/s over 1.5 ms or 0.375 ms in a period of 1 mm, or four times the latter with a grain that is out of the dump for three
+    frames."""
     monkeypatch.chdir(tmp_path)
     time = 0.045 / frames
     places = 5e-4 + np.tile(0.5 * time * np.arange(frames)[:, None, None], (1, 4, 1))
-    dumped(tmp_path, places, image_flags)
+    dumped(tmp_path, places, image_flags, [(10 + k, 2) for k in range(absent)])
     assert main(["tracks", "grains.dump", "--time-step", repr(time / 100)]) == 0
-    note = "note: by their velocities grains move up to 0.75 periods from frame to frame"
+    note = "note: by their velocities grains move up to 0.75 periods from one frame that has them to the next"
     assert (note in capsys.readouterr().out) == noted
 
 
