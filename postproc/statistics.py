@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,19 @@ def student(degrees: float, confidence: float = CONFIDENCE) -> float:
     """Two-sided quantile of Student's t distribution."""
     from scipy.special import stdtrit
     return float(stdtrit(degrees, 0.5 + 0.5 * confidence)) if degrees >= 1 else math.inf
+
+
+def variance_half(degrees: float, confidence: float = CONFIDENCE) -> float:
+    """Half-width, over the value, of the symmetric interval of a variance whose value over it is distributed as chi-square with these
+    `degrees` of freedom over them; inf for fewer than four, of which it is more than four times the value."""
+    from scipy.optimize import brentq
+    from scipy.special import chdtr
+
+    def lacks(half: float) -> float:
+        above = chdtr(degrees, degrees / (1.0 - half)) if half < 1.0 else 1.0
+        return float(above - chdtr(degrees, degrees / (1.0 + half))) - confidence
+
+    return float(brentq(lacks, 0.0, 100.0)) if degrees >= 4.0 else math.inf
 
 
 def tail_probability(limit: float, half: float, degrees: float) -> float:
@@ -197,19 +210,24 @@ def combined(parts: Sequence[float]) -> float:
     return math.sqrt(sum(part**2 for part in parts))
 
 
-def over_replicas(estimates: Sequence[Estimate]) -> Estimate:
-    """One estimate from those of the replicas: Student's interval over replicas from three on, else their own intervals pooled.
+def over_replicas(estimates: Sequence[Estimate], shared: float = 0.0) -> Estimate:
+    """One estimate from those of the replicas: Student's interval over replicas from three on, else their own intervals pooled; at least
+    `shared`, the half-width that all have in common, such as that of a reading, which no mean makes smaller.
 
     Two values say little about a spread (t = 12.7 with one degree of freedom); their interval reaches to both at least. Values that are all
-    equal, such as counts of nothing, show no spread: then their own intervals count, where they have such.
+    equal show no spread, though there may be one: their widest own interval counts, infinite where a run does not know it. Those of runs in
+    which nothing is random are `exact`.
     """
-    values, pooled = [one.value for one in estimates], combined([one.half for one in estimates]) / len(estimates)
-    if len(estimates) >= 3 and not (len(set(values)) == 1 and 0.0 < pooled < math.inf):
-        return replica_mean(values)
+    values, halves, count = [one.value for one in estimates], [one.half for one in estimates], len(estimates)
+    within = f"within {count} replica{'' if count == 1 else 's'}: {estimates[0].basis}"
+    if max(halves) > 0.0 and all(math.isclose(one, values[0], rel_tol=1e-12) for one in values):
+        basis = within if count < 3 else f"{count} replicas with equal values: {estimates[0].basis}"
+        return Estimate(values[0], max(*halves, shared), basis)
+    if count >= 3:
+        found = replica_mean(values)
+        return replace(found, half=max(found.half, shared))
     mean = float(np.mean(values))
-    half = max(pooled, *(abs(value - mean) for value in values))
-    plural = "" if len(estimates) == 1 else "s"
-    return Estimate(mean, half, f"within {len(estimates)} replica{plural}: {estimates[0].basis}")
+    return Estimate(mean, max(combined(halves) / count, shared, *(abs(value - mean) for value in values)), within)
 
 
 def rescaled(half: float, count: float, other: float, confidence: float = CONFIDENCE) -> float:

@@ -39,7 +39,7 @@ def lines(seen: Sequence[Tracks], movements: Mapping[str, Movement]) -> list[str
 def _shown(one: Estimate) -> str:
     if math.isnan(one.value):
         return "not known"
-    return f"{one.value:.4g}" + (f" ± {one.half:.2g}" if math.isfinite(one.half) else "")
+    return f"{one.value:.4g}" + (f" ± {one.half:.2g}" if math.isfinite(one.half) else f" (interval not known: {one.basis})")
 
 
 def dataset(tracks: Tracks, movement: Movement, **attributes: str | float) -> xarray.Dataset:
@@ -49,7 +49,7 @@ def dataset(tracks: Tracks, movement: Movement, **attributes: str | float) -> xa
     for name, (label, unit) in LABELS.items():
         units = {"": "1", "m²/s": "m2/s"}.get(unit, unit)
         variables |= with_interval({"coefficient": "self_diffusion"}.get(name, name), ("seen",), getattr(movement, name), units, label)
-    variables["mean_square_displacement"] = variable(("lag", "seen"), movement.squares, "m2", "mean square displacement about the mean")
+    variables["mean_square_displacement"] = variable(("lag", "seen"), movement.squares, "m2", "mean square displacement about the drift")
     coordinates = {"time": variable(("time",), tracks.times, "s", "simulated or measured time"),
                    "grain": variable(("grain",), tracks.ids, "1", "number of the grain"),
                    "axis": ("axis", list(tracks.axes)), "seen": ("seen", list(movement.axes)),

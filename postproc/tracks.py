@@ -26,7 +26,7 @@ from .dumps.frames import cell
 from .grains import GrainFrame
 from .resampling import resampled
 from .sources import Selection
-from .statistics import Estimate, TimeBlocks, time_blocks
+from .statistics import Estimate, TimeBlocks, correlation_time, time_blocks, variance_half
 
 Array = NDArray[np.float64]
 
@@ -53,15 +53,15 @@ class Displacements:
         """Mean squares (c,)."""
         return np.asarray((self.moves**2).mean(axis=0))
 
-    @property
-    def scatter(self) -> Array:
-        """Mean squares (c,) about the mean."""
-        return np.asarray(self.moves.var(axis=0))
-
-    def blocks(self) -> TimeBlocks:
-        """Time blocks of the frames up to the last, by the mean squares of the first component in each."""
+    def in_frames(self, values: Array) -> Array:
+        """Means of `values` (k,) of those that begin in each frame up to the last; where none does, the mean of all."""
         count = np.bincount(self.start)
-        return time_blocks(np.bincount(self.start, self.moves[:, 0] ** 2) / np.maximum(count, 1))
+        return np.divide(np.bincount(self.start, values), count, out=np.full(len(count), values.mean()), where=count > 0)
+
+    def blocks(self, values: Array | None = None) -> TimeBlocks:
+        """Time blocks of these frames by their means of `values` (k, m), default: the squares of all components; those of the slowest."""
+        found = [time_blocks(self.in_frames(one)) for one in (self.moves**2 if values is None else values).T]
+        return max(found, key=lambda one: (one.single, -one.count, one.widening))
 
     def over(self, keep: NDArray[np.bool_]) -> Displacements:
         """Those that begin in the frames that `keep` (frames,) marks."""
@@ -141,6 +141,25 @@ class Tracks:
             raise DembarkError(f"{self.name}: {seen.sum()} displacements over {frames * self.interval:.4g} s are too few")
         return Displacements(moves[seen], np.nonzero(seen)[0])
 
+    def drift(self) -> tuple[Array, int]:
+        """Mean displacement (c,) in a frame (m) between the ends of the tracks, and the frames between these ends, of all grains."""
+        seen = np.asarray(np.isfinite(self.positions).all(axis=2))
+        first, last = seen.argmax(axis=0), len(seen) - 1 - seen[::-1].argmax(axis=0)
+        known = np.flatnonzero(seen.any(axis=0))
+        moves = self.positions[last[known], known] - self.positions[first[known], known]
+        frames = int((last - first)[known].sum())
+        return moves.sum(axis=0) / max(frames, 1), frames
+
+    def scatter(self, frames: int) -> Displacements:
+        """Displacements over so many frames about the drift, enlarged so that their mean squares are unbiased; NaN of a single one.
+
+        Where each step has the variance s, l of them have s l; the drift over all M steps has s/M, and the covariance s/M with each. So
+        squares about l drifts are s l - 2 s l l/M + s l l/M = s l (1 - l/M), with gaps and tracks of unequal length, too.
+        """
+        found, (drift, total) = self.displacements(frames), self.drift()
+        left = math.sqrt(1.0 - frames / total) if frames < total else math.nan
+        return Displacements((found.moves - frames * drift) / left, found.start)
+
 
 def common(one: Tracks, other: Tracks) -> list[Tracks]:
     """Both along the axes that both have."""
@@ -152,24 +171,55 @@ def common(one: Tracks, other: Tracks) -> list[Tracks]:
 
 def diffusion(tracks: Tracks, lags: tuple[float, float], axis: int) -> Estimate:
     """Self-diffusion coefficient (m2/s) along an axis, by its number: half the growth of the mean square between two lags (s), about the
-    mean displacement, over their difference. The interval is that of time blocks."""
+    drift, over their difference. The interval is that of time blocks, or that of a random walk of independent grains where it is wider;
+    there is none for a walk of fewer than four degrees of freedom."""
     short, long = (tracks.lag(time) for time in lags)
     if short >= long:
         raise DembarkError(f"the lags {lags[0]:g} and {lags[1]:g} s are {short} and {long} frames", "", "give two that rise")
-    near, far = tracks.displacements(short), tracks.displacements(long)
-    about = [Displacements(one.moves[:, [axis]] - one.moves[:, [axis]].mean(axis=0), one.start) for one in (near, far)]
-    # Of the same time.
-    near, far = about[0].until(int(about[1].start.max())), about[1]
+    near, far = (Displacements(one.moves[:, [axis]], one.start) for one in (tracks.scatter(short), tracks.scatter(long)))
+    near = near.until(int(far.start.max()))  # of the same time
+    if not (len(near.moves) and np.isfinite(far.moves).all()):
+        return Estimate(math.nan, math.inf, "too few displacements over the lags")
     span = 2.0 * (long - short) * tracks.interval
-    return resampled(lambda keep, _: float(growth(near, far, keep)[0]) / span, far.blocks())
+    found = resampled(lambda keep, _: float(growth(near, far, keep)[0]) / span, far.blocks())
+    degrees = walk_degrees(tracks, short, long)
+    walk = Estimate(found.value, abs(found.value) * variance_half(degrees), f"a random walk of {degrees:.2g} degrees of freedom")
+    return max(found, walk, key=lambda one: one.half)
+
+
+def walk_degrees(tracks: Tracks, short: int, long: int) -> float:
+    """Degrees of freedom of chi-square of the growth of the mean square between two lags (frames) in a random walk that is seen as the
+    `tracks` are: twice its squared mean over its variance.
+
+    Of steps x of unit variance the growth is (Px)'B(Px), where P takes the drift out: its mean is tr PB, which is the difference of the
+    lags, its variance 2 tr PBPB. B sums ll' over the displacements, with l = 1 in the steps of one: tr BB is that of squared overlaps.
+    """
+    seen, number = np.unique(np.isfinite(tracks.positions).all(axis=2), axis=1, return_counts=True)
+    count, total, lags = len(seen), tracks.drift()[1], (short, long)
+    begin = [np.pad(seen[lag:] & seen[:-lag], ((0, lag), (0, 0))) for lag in lags]
+    begin[0][np.flatnonzero(begin[1].any(axis=1))[-1] + 1 :] = False
+    weights = [sign / (1.0 - lag / total) / float((one @ number).sum()) for lag, sign, one in zip(lags, (-1.0, 1.0), begin, strict=True)]
+    pairs, sums, rest = np.zeros((2, 2, count + 1), complex), 0.0, 0.0
+    for part in np.array_split(np.arange(len(number)), math.ceil(len(number) / 1000)):
+        of = [weight * one[:, part] for weight, one in zip(weights, begin, strict=True)]
+        spectra = [np.fft.rfft(one, 2 * count, axis=0) for one in of]
+        pairs += [[(one.conj() * other) @ number[part] for other in spectra] for one in spectra]
+        steps = np.sum([lag * np.cumsum(one - np.pad(one, ((lag, 0), (0, 0)))[:count], axis=0)
+                        for lag, one in zip(lags, of, strict=True)], axis=0)
+        sums, rest = sums + float(steps.sum(axis=0) @ number[part]), rest + float((steps**2).sum(axis=0) @ number[part])
+    apart = np.arange(2 * count)
+    apart[count:] -= 2 * count
+    overlaps = [[np.clip(np.minimum(one, apart + other) - np.maximum(0, apart), 0, None) for other in lags] for one in lags]
+    squares = float((np.fft.irfft(pairs, 2 * count) * np.square(overlaps)).sum())
+    return (long - short) ** 2 / (squares - 2.0 * rest / total + (sums / total) ** 2)
 
 
 @dataclass(frozen=True)
 class Movement:
     """What `measure` finds, along each of the `axes`, of displacements over the `interval` (s): `velocity`, mean (m/s); `fluctuation`, root
-    mean square about it (m/s), and `flatness`, fourth moment over that of a Gaussian distribution: 1 of it. `coefficient` (m2/s):
-    self-diffusion `between` two lags (s). `lags` (k,) in s and `squares` (k, c) in m2: mean square displacements about the mean;
-    `speeds`: velocities over the interval, (m, c) in m/s."""
+    of the mean square about it and the variance of that mean (m/s), and `flatness`, fourth moment over that of a Gaussian distribution: 1
+    of it. `coefficient` (m2/s): self-diffusion `between` two lags (s). `lags` (k,) in s and `squares` (k, c) in m2: mean square
+    displacements about the drift; `speeds`: velocities over the interval, (m, c) in m/s."""
 
     axes: str
     interval: float
@@ -194,18 +244,27 @@ def measure(tracks: Tracks, interval: float | None = None, lags: tuple[float, fl
     """Measure tracks; velocities are those over `interval` (s; default: one frame), the diffusion that between two `lags` (s; default: a
     tenth and four tenths of the time). DembarkError for lags that the tracks do not have."""
     frames = 1 if interval is None else tracks.lag(interval)
-    time, moves = frames * tracks.interval, tracks.displacements(frames)
-    speeds, blocks = moves.moves / time, moves.blocks()
-
-    def over(get: Callable[[Array], float]) -> list[Estimate]:
-        return [resampled(lambda keep, _, c=c: get(moves.over(keep).moves[:, c] / time), blocks)  # type: ignore[misc]
-                for c in range(len(tracks.axes))]
-
+    time, moves, total = frames * tracks.interval, tracks.displacements(frames), tracks.drift()[1]
+    along = [replace(moves, moves=moves.moves[:, [axis]] / time) for axis in range(len(tracks.axes))]
+    least = frames / max(total - frames, 1)
     known = np.unique(np.geomspace(1, max(1, len(tracks.times) // 2), 20).astype(int))
-    squares = np.array([tracks.displacements(int(lag)).scatter for lag in known])
+    squares = np.array([tracks.scatter(int(lag)).squares for lag in known])
     ends = lags or usual_lags(tracks)
-    return Movement(tracks.axes, time, ends, over(lambda v: float(v.mean())), over(lambda v: float(v.std())), over(_flatness),
-                    [diffusion(tracks, ends, axis) for axis in range(len(tracks.axes))], known * tracks.interval, squares, speeds)
+    return Movement(
+        tracks.axes, time, ends, [_resampled(lambda v, _: float(v.mean()), one, least) for one in along],
+        [_resampled(lambda v, of_mean: math.sqrt(float(v.var()) + of_mean), one, least) for one in along],
+        [_resampled(lambda v, _: _flatness(v), one, least) for one in along],
+        [diffusion(tracks, ends, axis) for axis in range(len(tracks.axes))], known * tracks.interval, squares, moves.moves / time)
+
+
+def _resampled(get: Callable[[Array, float], float], speeds: Displacements, least: float) -> Estimate:
+    """`get` of the velocities (k,) along an axis (m/s) and the variance of their mean, by which their own variance is too small: that of
+    correlated frames, or the part `least` of theirs if it is larger. The time blocks are those of the slower of velocity and square."""
+    one = speeds.moves[:, 0]
+    means = speeds.in_frames(one)
+    of_mean = max(float(means.var()) * correlation_time(means) / len(means), least * float(one.var()))
+    blocks = speeds.blocks(np.stack([one, (one - one.mean()) ** 2], axis=1))
+    return resampled(lambda keep, _: get(speeds.over(keep).moves[:, 0], of_mean), blocks)
 
 
 def _flatness(values: Array) -> float:
@@ -229,7 +288,7 @@ def follow(chosen: Selection, ids: Sequence[int] | None = None, advance: Callabl
         at = np.minimum(np.searchsorted(grains.ids, wanted), max(len(grains.ids) - 1, 0))
         there = grains.ids[at] == wanted if len(grains.ids) else np.zeros(len(wanted), bool)
         row = at[there]
-        places[number, there] = joined(grains, row, there, times[number] - times[max(number - 1, 0)])
+        places[number, there] = joined(grains, row, there, times[number])
         for name, values in _columns(grains, contacts).items():
             columns.setdefault(name, np.full(shape, np.nan))[number, there] = values[row]
         advance()
@@ -245,30 +304,30 @@ class _Joined:
     """Positions without the jumps at the faces of a periodic box."""
 
     def __init__(self, count: int) -> None:
-        self.last = np.full((count, 3), np.nan)
-        self.farthest = 0.0  # by the velocities, from frame to frame, in periods
+        self.last, self.time = np.full((count, 3), np.nan), np.full(count, np.nan)  # place (m) and time (s) of each when it was last seen
+        self.farthest = 0.0  # by the velocities since then, in periods
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A line where a grain moved half a period or more from frame to frame."""
-        note = (f"by their velocities grains move up to {self.farthest:.2g} periods from frame to frame, and the dump has no image flags: "
-                "tracks may be wrong by periods; dump ix iy iz, or more frames")
+        """A line where a grain moved half a period or more from one frame that has it to the next."""
+        note = (f"by their velocities grains move up to {self.farthest:.2g} periods from one frame that has them to the next, and the dump "
+                "has no image flags: tracks may be wrong by periods; dump ix iy iz, or more frames")
         return (note,) if self.farthest >= 0.5 else ()
 
-    def __call__(self, grains: GrainFrame, row: NDArray[np.intp], there: NDArray[np.bool_], interval: float) -> Array:
-        """Those of the grains in these rows of a frame, which are those of the tracks that `there` (n,) marks, `interval` (s) after the
-        frame before."""
+    def __call__(self, grains: GrainFrame, row: NDArray[np.intp], there: NDArray[np.bool_], time: float) -> Array:
+        """Those of the grains in these rows of a frame at `time` (s), which are those of the tracks that `there` (n,) marks."""
         places = grains.positions[row]
         if grains.periodic.any() and not grains.unwrapped:
             # A box of a plane layer may have no thickness, where it is not periodic.
             flat = ~grains.periodic & ~(grains.high > grains.low)
             edges, before = cell(grains.low, np.where(flat, grains.low + 1.0, grains.high), grains.tilt), self.last[there]
             if grains.has("velocities"):
-                moves = np.linalg.solve(edges.T, interval * grains.velocities[row].T)[grains.periodic]
+                away = np.nan_to_num(time - self.time[there])
+                moves = np.linalg.solve(edges.T, away * grains.velocities[row].T)[grains.periodic]
                 self.farthest = max(self.farthest, float(np.abs(moves).max(initial=0.0)))
             periods = np.where(grains.periodic, np.round(np.linalg.solve(edges.T, (places - before).T).T), 0.0)
             places = places - np.nan_to_num(periods) @ edges
-        self.last[there] = places
+        self.last[there], self.time[there] = places, time
         return places
 
 

@@ -15,10 +15,18 @@ from dembark.common.units import finite
 from dembark.postproc.measurement import Array, Estimate, Numbers, over_replicas
 from dembark.postproc.statistics import combined
 
+# 95 % half-width of a reading, in its steps: all places within half a step are alike.
+STEP = 0.475
 
-def over_chaotic(values: Iterable[float]) -> Estimate:
-    """Mean of one number from each run of a chaotic motion; a single run gives no interval."""
-    return over_replicas([Estimate(one, math.inf, "one run of a chaotic motion does not show its spread") for one in values])
+
+def over_chaotic(values: Iterable[float], read: float = math.inf) -> Estimate:
+    """Mean of one number from each run of a chaotic motion; a single run gives no interval. `read`: STEP of a reading, or what one more of
+    the things that are counted makes. The half-width is at least that, and just that of three or more equal numbers, which have no interval
+    where it is not known."""
+    found = list(values)
+    if math.isinf(read) or len(found) < 3:
+        return over_replicas([Estimate(one, math.inf, "one run of a chaotic motion does not show its spread") for one in found])
+    return over_replicas([Estimate(one, read, "steps of the reading") for one in found], shared=read)
 
 
 def of_packing(value: float) -> Estimate:

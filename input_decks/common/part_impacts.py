@@ -206,8 +206,8 @@ def impact_measurement(records: Sequence[ContactRecord], part: MeshWall, p: Numb
         "peak_force": Value(over_chaotic(float(own.mean()) for own in forces)),
         "peak_force_99": Value(over_chaotic(float(np.quantile(own, 0.99)) for own in forces)),
         "dents": Value(over_chaotic(
-            float((mean_pressures(own, one.radii[one.begins], true_modulus(p)) > p["flow_pressure"]).mean())
-            for one, own in zip(records, forces, strict=True))),
+            (float((mean_pressures(own, one.radii[one.begins], true_modulus(p)) > p["flow_pressure"]).mean())
+             for one, own in zip(records, forces, strict=True)), 1.0 / min(map(len, forces)))),
         "lone_impact": Value(over_chaotic(lone_impact(one, p) for one in records), exact(1.0)),
         "octave_sum": Value(exact(max(abs(one.unexplained) for one in noise)), exact(0.0)),
         "pulse_noise": Value(over_chaotic(one.ratio for one in noise)),

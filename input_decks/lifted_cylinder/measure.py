@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dembark.input_decks.common.estimates import over_chaotic, reference_rows
+from dembark.input_decks.common.estimates import STEP, over_chaotic, reference_rows
 from dembark.input_decks.common.heaps import at_rest, height
 from dembark.input_decks.common.momentum import unaccounted
 from dembark.postproc.grains import GrainFrame
@@ -25,6 +25,8 @@ EDGE = 0.3
 LOW, HIGH = 0.2, 0.7
 # Diameters from the axis within which the height is taken.
 NEAR = 2.0
+# Diameters from ring to ring, of which the outermost is the base.
+RINGS = 0.05
 # Time of the lift over sqrt(H/g), below which it releases the column: half of the grains then fall by less than 5 % of H.
 RELEASED = 0.3
 
@@ -50,7 +52,7 @@ def height_of_columns(aspect: float) -> float:
 def base_radius(radii: Array, diameter: float) -> float:
     """m, middle of the outermost ring, one `diameter` (m) wide, in which grains at `radii` (n,) in m from the axis are EDGE of a layer."""
     r = np.sort(radii)
-    middles = np.arange(0.5 * diameter, r[-1] + diameter, 0.05 * diameter)
+    middles = np.arange(0.5 * diameter, r[-1] + diameter, RINGS * diameter)
     low, high = (np.searchsorted(r, middles + side * diameter) for side in (-0.5, 0.5))
     covered = (high - low) * diameter >= EDGE * 2.0 * np.pi * middles
     return float(middles[covered][-1]) if covered.any() else 0.0
@@ -124,11 +126,12 @@ def measure(replicas: Replicas) -> Measurement:
         return Measurement(values | {"level_angle": Value(angle, exact(0.0))}, [_surface(replicas)])
     values |= {"angle": Value(angle, reason=moving or raining, compared=resting),
                "heap_height": Value(over_chaotic(one.height / d for one in heaps), reason=raining, compared=resting),
-               "base_radius": Value(over_chaotic(one.base / d for one in heaps), reason=raining, compared=resting)}
+               "base_radius": Value(over_chaotic((one.base / d for one in heaps), STEP * RINGS), reason=raining, compared=resting)}
     columns = [height(ends(replica)[0]) for replica in replicas]
     if replicas[0].derived["lift_time"] < RELEASED * math.sqrt(np.mean(columns) / p["gravity"]):
         aspect = over_chaotic(one / radius for one in columns)
-        run_out, deposit = over_chaotic(one.base / radius - 1.0 for one in heaps), over_chaotic(one.height / radius for one in heaps)
+        run_out = over_chaotic((one.base / radius - 1.0 for one in heaps), STEP * RINGS * d / radius)
+        deposit = over_chaotic(one.height / radius for one in heaps)
         known = np.array([(row.number("aspect_ratio"), row.number("run_out")) for row in reference_rows(CODE)])
         outside = "" if 0.95 <= aspect.value <= known[-1, 0] else f"the other code has columns of H/R from 1 to 3, not {aspect.value:.3g}"
         open_for = moving or raining

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dembark.input_decks.common.estimates import over_chaotic
 from dembark.input_decks.common.log_run import LogRun, over_time, read, solver_values
 from dembark.postproc.measurement import Array, Curve, Measurement, Replicas, Value, block_mean, exact, number, over_replicas, profile
-from dembark.postproc.statistics import replica_mean
 
 REST = 0.1  # the share of the run, at its end, in which the stack is at rest
 WALLS = (-1, -2, -3)  # ground, left and right stake
@@ -68,9 +68,9 @@ def impact_values(runs: Sequence[LogRun]) -> dict[str, Value]:
     if min(map(len, found)) < 2:
         return {}
     return {
-        "impact_count": Value(replica_mean([len(impacts) for impacts in found])),
-        "impact_peak": Value(replica_mean([float(np.exp(np.log(impacts[:, 4]).mean())) for impacts in found])),
-        "impact_impulse": Value(replica_mean([float(np.median(impacts[:, 5])) for impacts in found])),
+        "impact_count": Value(over_chaotic(len(impacts) for impacts in found)),
+        "impact_peak": Value(over_chaotic(float(np.exp(np.log(impacts[:, 4]).mean())) for impacts in found)),
+        "impact_impulse": Value(over_chaotic(float(np.median(impacts[:, 5])) for impacts in found)),
     }
 
 

@@ -78,7 +78,8 @@ def verdicts(**changes: Any) -> Verdicts:
 def study(name: str, along: str, changes: list[dict[str, Any]], quantities: dict[str, list[float]]) -> Verdicts:
     """What the study makes of quantities known within 1 %."""
     given = [point(defaults("transport_container") | changed, {key: values[k] for key, values in quantities.items()}, part=0.01, profiles=[
-        {"name": "slide_slopes", "value": (values[k] * BEDS).tolist()} for key, values in quantities.items() if key == "slide_slope"])
+        {"name": "slide_slopes", "value": (values[k] * BEDS * (1.0 + 1e-3 * k * BEDS)).tolist()} for key, values in quantities.items()
+        if key == "slide_slope"])
         for k, changed in enumerate(changes)]
     return judged("transport_container", container.study(name, given, along))
 

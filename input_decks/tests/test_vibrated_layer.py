@@ -17,6 +17,7 @@ from dembark.input_decks.common.vibration import PHASES
 from dembark.input_decks.tests.measuring import Control, defaults, judged, module, names, point
 from dembark.input_decks.vibrated_layer.layer import read
 from dembark.postproc import DumpError
+from dembark.postproc.statistics import Estimate
 
 layer = module("vibrated_layer")
 D, STRIDE, STILL = 0.005, 10, 4
@@ -121,6 +122,13 @@ def test_the_onset_of_order_is_between_waves_that_come_and_go_and_waves_that_sta
     assert found["onset"]["value"] == pytest.approx(2.0, abs=0.1)
     assert found["order_onset"]["value"] == pytest.approx(2.5) and found["order_onset"]["verdict"] == "pass"
     assert found["order_onset"]["interval"] == pytest.approx([2.4, 2.6])
+
+
+@pytest.mark.parametrize("last", [2.5, 3.0])
+def test_a_bracket_that_all_runs_share_is_no_narrower_for_their_number(last: float) -> None:
+    runs = [SimpleNamespace(onset=lambda **_: Estimate(2.0, 0.1), order_onset=lambda at=at: Estimate(at, 0.25))
+            for at in [2.5] * 9 + [last]]
+    assert layer.of_sweep(runs, defaults("vibrated_layer", motion_frequency=FAST))["order_onset"].estimate.half >= 0.25
 
 
 def test_waves_of_a_slow_plate_have_no_verdict() -> None:

@@ -113,10 +113,11 @@ def measured(folder: Path, booked: float = 1.0, lost: int = 0, *, lighter: float
     softer = hits.peaks()[0] / hits.shadows(hits.radii, own_modulus(p), p["restitution"])[0][0]
     p["youngs_modulus"] *= softer**2.5
     replicas = []
-    for _ in range(packings):
+    for packing in range(packings):
         replica = Replica(Path(), {"parameters": p})
+        own = replace(hits, masses=lighter * (1.0 + 1e-4 * packing) * hits.masses)
         replica.__dict__["_read"] = {vibratory_trough.read.__wrapped__: light, hardening.part_wall.__wrapped__: SQUARE,
-                                     hardening.contact_record.__wrapped__: replace(hits, masses=lighter * hits.masses)}
+                                     hardening.contact_record.__wrapped__: own}
         replicas.append(replica)
     return judged("vibro_hardening", hardening.measure(replicas))
 

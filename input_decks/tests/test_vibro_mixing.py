@@ -24,11 +24,12 @@ D, STRIDE = 0.005, 10
 SITES = np.array([((i + 0.5) * D, 0.0, (k + 0.5) * D) for i in range(20) for k in range(12)])
 
 
-def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: float = 0.0, single: int = 9 * 12, **changes: Any) -> Any:
+def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: float = 0.0, single: int = 9 * 12, seed: int = 3,
+           **changes: Any) -> Any:
     """A run in which `swaps` pairs of grains change places in each period. `rising`: way (d) of the grains of the second sort in a period;
     `drift`: vertical way of the grains at the walls in a period; `single`: site of a single large grain."""
     given = defaults("vibro_mixing", **{"periods": 20, "grain_count": len(SITES)} | changes)
-    random, count = np.random.default_rng(3), len(SITES)
+    random, count = np.random.default_rng(seed), len(SITES)
     large = np.zeros(count, bool)
     if given["mixture"] == "two_sorts":
         large[random.permutation(count)[:40]] = True
@@ -54,7 +55,7 @@ def shaken(*, swaps: int = 10, rising: float = 0.0, drift: float = 0.0, lost: fl
 
 
 def verdicts(packings: int = 1, **changes: Any) -> dict[str, Any]:
-    return judged("vibro_mixing", mixing.measure([shaken(**changes)] * packings))
+    return judged("vibro_mixing", mixing.measure([shaken(seed=3 + k, **changes) for k in range(packings)]))
 
 
 DENSE = {"mixture": "two_sorts", "size_ratio": 1.0, "density_ratio": 3.0}

@@ -119,7 +119,9 @@ def of_level(runs: list[Layer], gamma: float, p: Numbers) -> dict[str, Value]:
 
 def of_sweep(runs: list[Layer], p: Numbers) -> dict[str, Value]:
     """From where on there are waves, and on the way back when there is one."""
-    begin, order = (over_replicas([find(one) for one in runs]) for find in (Layer.onset, Layer.order_onset))
+    begin, brackets = over_replicas([one.onset() for one in runs]), [one.order_onset() for one in runs]
+    # All runs have the same levels.
+    order = over_replicas(brackets, shared=max(one.half for one in brackets))
     # A sweep that shows no onset decides nothing.
     values = {"onset": Value(begin, reason="" if math.isfinite(begin.value) else begin.basis),
               "order_onset": Value(order, exact(ONSET) if plain(p) else None,

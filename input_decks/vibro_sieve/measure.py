@@ -93,7 +93,8 @@ def measure(replicas: Replicas) -> Measurement:
     p, runs = replicas[0].parameters, [read(replica) for replica in replicas]
     undersize = p["grain_count"] - round(p["oversize_part"] * p["grain_count"])
     counts = [one.on for one in runs]
-    found = over_chaotic(rate(on) for on in counts)
+    # One grain more or less.
+    found = over_chaotic((rate(on) for on in counts), 1.0 / min(max(float(on[:-1].sum()), 1.0) for on in counts))
     chance = Estimate(1.0 - math.exp(-found.value), math.exp(-found.value) * found.half, found.basis)
     coverage = over_chaotic(one.coverage for one in runs)
     order = over_chaotic(halves_ratio(one.on) for one in runs)
@@ -103,9 +104,9 @@ def measure(replicas: Replicas) -> Measurement:
         "energy_balance": number(max(unexplained_energy(replica.times()) for replica in replicas), 0.0),
         "oversize_passed": number(sum(one.through for one in runs), 0.0),
         "grains_lost": number(sum(one.lost for one in runs), 0.0),
-        "start": Value(over_chaotic(on[0] / undersize for on in counts)),
+        "start": Value(over_chaotic((on[0] / undersize for on in counts), 1.0 / undersize)),
         "coverage": Value(coverage),
-        "passed": Value(over_chaotic(1.0 - on[-1] / on[0] for on in counts)),
+        "passed": Value(over_chaotic((1.0 - on[-1] / on[0] for on in counts), 1.0 / min(max(on[0], 1) for on in counts))),
         "rate": Value(found),
         "order": Value(order, exact(1.0) if len(counts) > 2 and math.isfinite(order.value) else None, inapplicable=crowded),
         "chance": above(chance, random_chance(p), meetings(p)),

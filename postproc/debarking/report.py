@@ -138,8 +138,7 @@ def against(groups: Mapping[float, Sequence[Outcome]], label: str) -> Figure:
             found = [degree(groups[value], float(one)) for one in seconds]
             middle, half = np.array([one.value for one in found]), np.array([one.half for one in found])
             over_time.plot(seconds / 60.0, middle, color=colour, label=f"{value:g}")
-            if np.isfinite(half).all():
-                over_time.fill_between(seconds / 60.0, middle - half, middle + half, color=colour, alpha=0.2, lw=0.0)
+            over_time.fill_between(seconds / 60.0, middle - half, middle + half, where=np.isfinite(half), color=colour, alpha=0.2, lw=0.0)
         over_time.set(xlabel="residence time (min)", ylabel="degree of debarking (%)", ylim=(0, 102), xlim=(0, seconds[-1] / 60.0))
         over_time.legend(title=label, loc="lower right")
         for number, share in enumerate((0.25, 0.5, 1.0)):

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from dembark.postproc.resampling import resampled
@@ -20,6 +22,7 @@ from dembark.postproc.statistics import (
     steady_start,
     tail_probability,
     time_blocks,
+    variance_half,
 )
 
 
@@ -97,9 +100,20 @@ def test_pooling_below_three_replicas_keeps_their_own_intervals():
     assert over_replicas([Estimate(1.0, 0.3)]).half == 0.3
     assert over_replicas([Estimate(1.25, 0.3), Estimate(1.75, 0.4)]) == Estimate(1.5, 0.25, "within 2 replicas: ")
     assert over_replicas([Estimate(1.0, 0.3), Estimate(2.0, 0.4)]).half == 0.5  # they differ by more than either varies
-    assert over_replicas([Estimate(1.0, 9.0)] * 3).half == pytest.approx(9.0 / math.sqrt(3.0))  # equal values show no spread
     assert over_replicas([Estimate(1.0, 9.0), Estimate(1.0, 9.0), Estimate(1.0, 0.0), Estimate(1.3, 0.0)]).half < 0.3
-    assert over_replicas([Estimate(1.0, math.inf)] * 3).half == over_replicas([Estimate(1.0, 0.0)] * 3).half == 0.0
+
+
+@given(st.integers(1, 6), st.floats(-10.0, 10.0), st.lists(st.floats(0.0, 10.0) | st.just(math.inf), min_size=6, max_size=6))
+def test_equal_values_have_the_widest_of_their_own_intervals(count, value, halves):
+    """They show no spread. Where nothing is random all are 0."""
+    assert over_replicas([Estimate(value, half) for half in halves[:count]]).half == max(halves[:count])
+    assert math.isinf(over_replicas([Estimate(one, math.inf) for one in (0.1 + 0.2, 0.3, 0.3)]).half)
+
+
+@given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=9), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_no_number_of_replicas_makes_an_interval_narrower_than_what_they_share(values, half, shared):
+    found = over_replicas([Estimate(one, half) for one in values], shared=shared)
+    assert found.half >= shared and found.value == pytest.approx(np.mean(values), abs=1e-12)
 
 
 def test_joint_interval_adds_in_quadrature():
@@ -123,6 +137,13 @@ def test_the_chance_of_a_value_beyond_a_limit_is_that_of_its_interval():
     assert tail_probability(2.0, 2.0, 4.0) == pytest.approx(0.05) == tail_probability(0.3, 0.3, math.inf)
     assert tail_probability(2.0, 1.0, math.inf) == pytest.approx(math.erfc(2.0 * 1.959964 / math.sqrt(2.0)), rel=1e-5)
     assert tail_probability(2.0, 1.0, 2.0) > tail_probability(2.0, 1.0, 9.0) > tail_probability(2.0, 1.0, math.inf)
+
+
+@pytest.mark.parametrize("degrees", [4.0, 9.5, 200.0])
+def test_the_interval_of_a_variance_holds_it_in_95_percent(degrees):
+    found = np.random.default_rng(14).chisquare(degrees, 20000) / degrees
+    assert np.mean(np.abs(found - 1.0) <= found * variance_half(degrees)) == pytest.approx(0.95, abs=0.005)
+    assert variance_half(3.9) == math.inf
 
 
 @pytest.mark.parametrize("length", [50, 120])

@@ -30,7 +30,7 @@ from dembark.common.errors import RunError
 from dembark.postproc.statistics import CONFIDENCE as INTERVAL
 from dembark.postproc.statistics import joint_limit, replica_mean, rescaled
 
-from .decision import PACKINGS, enough_packings, packings
+from .decision import DIFFER, PACKINGS, enough_packings, packings
 from .result import METRICS, ComparedRecord, Comparison, QuantityRecord, Result, read
 
 CAP = 0.10
@@ -99,14 +99,15 @@ def pair(reference: QuantityRecord, value: QuantityRecord, reference_engine: str
         few, unknown = min(packings(value.basis), packings(reference.basis)), next((one for one in both if one.half is None), None)
         if planned < PACKINGS and (unknown is not None or few < PACKINGS):
             tolerance, verdict, reason = None, "info", f"{PACKINGS} packings in each engine are needed to compare them"
-        elif deviation is None:
+        elif deviation is None or (value.value == 0.0 and value.half is None):
             verdict, reason = "info", "a tenth of 0 decides nothing"
-            if not value.value:
+            other = value if value.value else reference
+            if not other.value:
                 verdict, reason = "pass", ""
-            elif value.half is not None and abs(value.value) > value.half:
-                verdict, reason = "fail", "the other engine's is 0"
+            elif other.half is not None and abs(other.value) > other.half:
+                verdict, reason = "fail", "the other engine's is 0" if value.value else "the other engine's is not 0"
         elif unknown is not None or few < PACKINGS:
-            verdict, decided = "info", f"{PACKINGS} packings in each engine or more"
+            verdict, decided = "info", f"{PACKINGS} packings in each engine or more" if few < PACKINGS else DIFFER
             reason = "an interval comes from fewer packings than planned" if unknown is None else (
                 f"an interval is unknown: {unknown.basis or 'the run is too short'}")
         else:

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dembark.postproc.statistics import rescaled
 
 PACKINGS = 3
+# Of three or more whose values are all equal.
+DIFFER = "packings whose values differ, or a finer reading"
 # So many packings are beyond any campaign.
 _MOST = 1000
 
@@ -27,6 +29,8 @@ def decides(deviation: float, own: float, reference: float, tolerance: float, ba
         return f"{known} known to {_limits(target, reference)}"
     wanted = math.sqrt(target**2 - reference**2)
     enough, longer = f"{PACKINGS} packings or more", f"runs about {max((own / wanted) ** 2, 1.1):.2g} times as long"
+    if math.isinf(own) and PACKINGS <= count < math.inf:
+        return DIFFER
     if count < PACKINGS or not math.isfinite(own):
         return enough if count == 1.0 or not math.isfinite(own) else f"{enough}, or {longer}"
     if math.isfinite(count):

@@ -38,6 +38,17 @@ def test_verdict_of_a_pair(one, other, verdict):
     assert pair(entry(*one), entry(*other), "liggghts", "yade").verdict == verdict
 
 
+@pytest.mark.parametrize(("one", "other", "verdict"), [
+    ((0.0, None), (0.0, None), "pass"), ((0.0, None), (1.0, 0.1), "fail"), ((1.0, 0.1), (0.0, None), "fail"),
+    ((0.0, None), (1.0, None), "info"), ((1.0, None), (0.0, None), "info"), ((1.0, None), (1.0, None), "info")])
+def test_equal_values_in_all_packings_are_compared_alike_in_either_order(one, other, verdict):
+    """They have no interval. Nothing in one engine alone is a difference."""
+    found = pair(entry(*one, "3 replicas with equal values"), entry(*other, "3 replicas"), "liggghts", "yade")
+    assert found.verdict == verdict
+    if one[0]:
+        assert found.decides in ("", "packings whose values differ, or a finer reading")
+
+
 @pytest.mark.parametrize("other", [1.0, 1.05, 1.5])
 @pytest.mark.parametrize("packings", ["1 replica", "2 replicas"])
 def test_engines_with_fewer_than_three_packings_are_not_compared(other, packings):

@@ -34,6 +34,7 @@ def test_that_many_packings_of_the_same_scatter_decide_and_fewer_do_not(count: i
     (0.2, 0.0, "8 time blocks", "runs about 4 times as long"),
     (0.104, 0.0, "8 time blocks", "runs about 1.1 times as long"),
     (math.inf, 0.0, "one run", "3 packings or more"),
+    (math.inf, 0.0, "3 replicas with equal values: one run", "packings whose values differ, or a finer reading"),
     (0.2, 0.0, "the inputs", "inputs known well enough to change the value by at most ±0.1, now ±0.2"),
     (0.01, 0.3, "5 replicas", "a reference known to ±0.1, now ±0.3"),
     (0.01, 0.1004, "5 replicas", "a reference known to ±0.1, now ±0.1004"),
