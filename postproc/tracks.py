@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -141,6 +142,7 @@ class Tracks:
             raise DembarkError(f"{self.name}: {seen.sum()} displacements over {frames * self.interval:.4g} s are too few")
         return Displacements(moves[seen], np.nonzero(seen)[0])
 
+    @cached_property
     def drift(self) -> tuple[Array, int]:
         """Mean displacement (c,) in a frame (m) between the ends of the tracks, and the frames between these ends, of all grains."""
         seen = np.asarray(np.isfinite(self.positions).all(axis=2))
@@ -156,7 +158,7 @@ class Tracks:
         Where each step has the variance s, l of them have s l; the drift over all M steps has s/M, and the covariance s/M with each. So
         squares about l drifts are s l - 2 s l l/M + s l l/M = s l (1 - l/M), with gaps and tracks of unequal length, too.
         """
-        found, (drift, total) = self.displacements(frames), self.drift()
+        found, (drift, total) = self.displacements(frames), self.drift
         left = math.sqrt(1.0 - frames / total) if frames < total else math.nan
         return Displacements((found.moves - frames * drift) / left, found.start)
 
@@ -169,22 +171,26 @@ def common(one: Tracks, other: Tracks) -> list[Tracks]:
     return [one.along(axes), other.along(axes)]
 
 
-def diffusion(tracks: Tracks, lags: tuple[float, float], axis: int) -> Estimate:
-    """Self-diffusion coefficient (m2/s) along an axis, by its number: half the growth of the mean square between two lags (s), about the
-    drift, over their difference. The interval is that of time blocks, or that of a random walk of independent grains where it is wider;
-    there is none for a walk of fewer than four degrees of freedom."""
+def diffusion(tracks: Tracks, lags: tuple[float, float]) -> list[Estimate]:
+    """Self-diffusion coefficients (m2/s) along the axes: half the growth of the mean square between two lags (s), about the drift, over
+    their difference. The interval is that of time blocks, or that of a random walk of independent grains where it is wider; there is none
+    for a walk of fewer than four degrees of freedom."""
     short, long = (tracks.lag(time) for time in lags)
     if short >= long:
         raise DembarkError(f"the lags {lags[0]:g} and {lags[1]:g} s are {short} and {long} frames", "", "give two that rise")
-    near, far = (Displacements(one.moves[:, [axis]], one.start) for one in (tracks.scatter(short), tracks.scatter(long)))
+    near, far = tracks.scatter(short), tracks.scatter(long)
     near = near.until(int(far.start.max()))  # of the same time
     if not (len(near.moves) and np.isfinite(far.moves).all()):
-        return Estimate(math.nan, math.inf, "too few displacements over the lags")
-    span = 2.0 * (long - short) * tracks.interval
-    found = resampled(lambda keep, _: float(growth(near, far, keep)[0]) / span, far.blocks())
-    degrees = walk_degrees(tracks, short, long)
-    walk = Estimate(found.value, abs(found.value) * variance_half(degrees), f"a random walk of {degrees:.2g} degrees of freedom")
-    return max(found, walk, key=lambda one: one.half)
+        return [Estimate(math.nan, math.inf, "too few displacements over the lags")] * len(tracks.axes)
+    span, degrees = 2.0 * (long - short) * tracks.interval, walk_degrees(tracks, short, long)
+
+    def along(axis: int) -> Estimate:
+        one, other = (Displacements(each.moves[:, [axis]], each.start) for each in (near, far))
+        found = resampled(lambda keep, _: float(growth(one, other, keep)[0]) / span, other.blocks())
+        walk = Estimate(found.value, abs(found.value) * variance_half(degrees), f"a random walk of {degrees:.2g} degrees of freedom")
+        return max(found, walk, key=lambda one: one.half)
+
+    return [along(axis) for axis in range(len(tracks.axes))]
 
 
 def walk_degrees(tracks: Tracks, short: int, long: int) -> float:
@@ -195,7 +201,7 @@ def walk_degrees(tracks: Tracks, short: int, long: int) -> float:
     lags, its variance 2 tr PBPB. B sums ll' over the displacements, with l = 1 in the steps of one: tr BB is that of squared overlaps.
     """
     seen, number = np.unique(np.isfinite(tracks.positions).all(axis=2), axis=1, return_counts=True)
-    count, total, lags = len(seen), tracks.drift()[1], (short, long)
+    count, total, lags = len(seen), tracks.drift[1], (short, long)
     begin = [np.pad(seen[lag:] & seen[:-lag], ((0, lag), (0, 0))) for lag in lags]
     begin[0][np.flatnonzero(begin[1].any(axis=1))[-1] + 1 :] = False
     weights = [sign / (1.0 - lag / total) / float((one @ number).sum()) for lag, sign, one in zip(lags, (-1.0, 1.0), begin, strict=True)]
@@ -244,7 +250,7 @@ def measure(tracks: Tracks, interval: float | None = None, lags: tuple[float, fl
     """Measure tracks; velocities are those over `interval` (s; default: one frame), the diffusion that between two `lags` (s; default: a
     tenth and four tenths of the time). DembarkError for lags that the tracks do not have."""
     frames = 1 if interval is None else tracks.lag(interval)
-    time, moves, total = frames * tracks.interval, tracks.displacements(frames), tracks.drift()[1]
+    time, moves, total = frames * tracks.interval, tracks.displacements(frames), tracks.drift[1]
     along = [replace(moves, moves=moves.moves[:, [axis]] / time) for axis in range(len(tracks.axes))]
     least = frames / max(total - frames, 1)
     known = np.unique(np.geomspace(1, max(1, len(tracks.times) // 2), 20).astype(int))
@@ -254,7 +260,7 @@ def measure(tracks: Tracks, interval: float | None = None, lags: tuple[float, fl
         tracks.axes, time, ends, [_resampled(lambda v, _: float(v.mean()), one, least) for one in along],
         [_resampled(lambda v, of_mean: math.sqrt(float(v.var()) + of_mean), one, least) for one in along],
         [_resampled(lambda v, _: _flatness(v), one, least) for one in along],
-        [diffusion(tracks, ends, axis) for axis in range(len(tracks.axes))], known * tracks.interval, squares, moves.moves / time)
+        diffusion(tracks, ends), known * tracks.interval, squares, moves.moves / time)
 
 
 def _resampled(get: Callable[[Array, float], float], speeds: Displacements, least: float) -> Estimate:

@@ -42,7 +42,7 @@ def test_a_random_walk_has_its_diffusion_drift_and_gaussian_velocities():
 
 def test_the_intervals_of_the_diffusion_hold_its_value():
     held = [abs(one.value - EXACT[0]) <= one.half for seed in range(60)
-            for one in [diffusion(walk(seed, grains=10, frames=201), (2 * STEP, 10 * STEP), 0)]]
+            for one in [diffusion(walk(seed, grains=10, frames=201), (2 * STEP, 10 * STEP))[0]]]
     assert np.mean(held) > 0.85  # 95 % intervals; 60 of them scatter
 
 
@@ -82,15 +82,15 @@ def test_self_diffusion_and_mean_squares_of_few_tracers_are_unbiased(grains, los
     seen = np.random.default_rng(seed).random((16, grains)) >= lost
     seen[:6, 1:2] = seen[11:, 2:] = False
     assume(min((seen[lag:] & seen[:-lag]).sum() for lag in lags) >= 8)
-    assert sum(diffusion(one, lags, 0).value for one in unit_walks(seen)) == pytest.approx(0.5)
+    assert sum(diffusion(one, lags)[0].value for one in unit_walks(seen)) == pytest.approx(0.5)
     assert [sum(one.scatter(lag).squares[0] for one in unit_walks(seen)) for lag in lags] == pytest.approx(lags)
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.2])
 def test_degrees_of_freedom_are_those_of_the_quadratic_form(lost):
     seen, units = np.random.default_rng(3).random((10, 2)) >= lost, np.eye(18)
-    alone = [diffusion(places_of(one, seen), (1, 2), 0).value for one in units]
-    both = [0.5 * (diffusion(places_of(units[i] + units[k], seen), (1, 2), 0).value - alone[i] - alone[k])
+    alone = [diffusion(places_of(one, seen), (1, 2))[0].value for one in units]
+    both = [0.5 * (diffusion(places_of(units[i] + units[k], seen), (1, 2))[0].value - alone[i] - alone[k])
             for i in range(18) for k in range(i)]
     squares = np.sum(np.square(alone)) + 2.0 * np.sum(np.square(both))
     assert tracking.walk_degrees(places_of(units[0], seen), 1, 2) == pytest.approx(np.sum(alone) ** 2 / squares)
@@ -107,7 +107,7 @@ def test_intervals_of_the_diffusion_of_few_tracers_hold_its_value(grains, kind):
         elif kind == "of unequal length":
             for grain in range(1, grains):
                 tracks.positions[random.integers(10, 121):, grain] = np.nan
-        one = diffusion(tracks, (2 * STEP, 6 * STEP), 0)
+        one = diffusion(tracks, (2 * STEP, 6 * STEP))[0]
         held.append(abs(one.value - EXACT[0]) <= one.half < 20.0 * EXACT[0])
     assert np.mean(held) >= 0.89  # 95 % less three standard deviations of a hundred
 
