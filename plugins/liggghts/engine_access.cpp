@@ -23,7 +23,13 @@ enum Member {
   gravity_source,
   variable_count,
   variable_names,
-  variable_texts
+  variable_texts,
+  excluded_type_count,
+  excluded_type_1,
+  excluded_type_2,
+  excluded_group_count,
+  excluded_bit_1,
+  excluded_bit_2
 };
 template <Member>
 struct Tag {};
@@ -46,6 +52,12 @@ auto pointer(Tag<variable_names>);
 auto pointer(Tag<variable_texts>);
 auto pointer(Tag<mesh_precision>);
 auto pointer(Tag<gravity_source>);
+auto pointer(Tag<excluded_type_count>);
+auto pointer(Tag<excluded_type_1>);
+auto pointer(Tag<excluded_type_2>);
+auto pointer(Tag<excluded_group_count>);
+auto pointer(Tag<excluded_bit_1>);
+auto pointer(Tag<excluded_bit_2>);
 template struct Reach<keyword_map, &Settings::settings>;
 template struct Reach<fix_map, &Modify::fix_map>;
 template struct Reach<command_map, &Input::command_map>;
@@ -61,12 +73,25 @@ template struct Reach<variable_names, &Variable::names>;
 template struct Reach<variable_texts, &Variable::data>;
 template struct Reach<mesh_precision, &MultiNodeMesh<3>::precision_>;
 template struct Reach<gravity_source, &FixGravity::varflag>;
+template struct Reach<excluded_type_count, &Neighbor::nex_type>;
+template struct Reach<excluded_type_1, &Neighbor::ex1_type>;
+template struct Reach<excluded_type_2, &Neighbor::ex2_type>;
+template struct Reach<excluded_group_count, &Neighbor::nex_group>;
+template struct Reach<excluded_bit_1, &Neighbor::ex1_bit>;
+template struct Reach<excluded_bit_2, &Neighbor::ex2_bit>;
 
 template <Member name, class Type, class Owner>
 Type& reach(Owner& owner) {
   static_assert(std::is_same_v<decltype(owner.*pointer(Tag<name>())), Type&>,
                 "a private member of this LIGGGHTS has another type than in LIGGGHTS-PUBLIC 3.8.0: use that version");
   return owner.*pointer(Tag<name>());
+}
+
+template <Member count, Member first, Member second>
+std::vector<std::pair<int, int>> excluded(Neighbor& neighbor) {
+  std::vector<std::pair<int, int>> all;
+  for (int k = 0; k < reach<count, int>(neighbor); ++k) all.emplace_back(reach<first, int*>(neighbor)[k], reach<second, int*>(neighbor)[k]);
+  return all;
 }
 
 }  // namespace
@@ -97,6 +122,12 @@ std::vector<std::pair<std::string, std::string>> formulas(Variable& variables) {
   return all;
 }
 bool from_variables(FixGravity& gravity) { return reach<gravity_source, int>(gravity) != 0; }
+std::vector<std::pair<int, int>> excluded_types(Neighbor& neighbor) {
+  return excluded<excluded_type_count, excluded_type_1, excluded_type_2>(neighbor);
+}
+std::vector<std::pair<int, int>> excluded_groups(Neighbor& neighbor) {
+  return excluded<excluded_group_count, excluded_bit_1, excluded_bit_2>(neighbor);
+}
 double precision(TriMesh& mesh) { return reach<mesh_precision, double>(static_cast<MultiNodeMesh<3>&>(mesh)); }
 
 }  // namespace dembark_liggghts

@@ -17,6 +17,7 @@
 #include "granular_wall.h"
 #include "input.h"
 #include "modify.h"
+#include "neighbor.h"
 #include "settings.h"
 #include "tri_mesh.h"
 #include "variable.h"
@@ -56,6 +57,9 @@ std::vector<std::pair<std::string, std::string>> formulas(LAMMPS_NS::Variable& v
 double precision(LAMMPS_NS::TriMesh& mesh);
 /// Whether a gravity comes from variables: the fix itself alone can say, and it computes them after the forces of the pairs.
 bool from_variables(LAMMPS_NS::FixGravity& gravity);
+/// Pairs of types, and pairs of bits of groups, that `neigh_modify exclude` leaves out: the engine only says whether there are some.
+std::vector<std::pair<int, int>> excluded_types(LAMMPS_NS::Neighbor& neighbor);
+std::vector<std::pair<int, int>> excluded_groups(LAMMPS_NS::Neighbor& neighbor);
 
 }  // namespace dembark_liggghts
 

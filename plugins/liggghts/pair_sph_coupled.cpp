@@ -15,7 +15,6 @@
 #include "force.h"
 #include "memory.h"
 #include "modify.h"
-#include "neigh_list.h"
 #include "neighbor.h"
 #include "update.h"
 
@@ -119,7 +118,6 @@ void PairSphCoupled::init_style() {
   if (!fluid_fix_) refuse("nothing moves the fluid; add fix ID group nve/sph/coupled, with the group of the fluid");
   scene_.bodies.assign(solids_.size(), Body{});
   films_.clear();
-  neighbor->request(this);
 }
 
 int PairSphCoupled::number(const FixSphBody *solid) const {
@@ -197,6 +195,14 @@ std::string PairSphCoupled::wrong_with(int i) const {
   if (groups > 0 && s.dimension == 2 && !(std::fabs(atom->x[i][2]) <= 1e-6 * s.spacing))
     return "is at z = " + text(atom->x[i][2]) + " m; in the plane all are at z = 0, one layer of the lattice";
   if (!fluid) return "";
+  // The search for neighbours of the fluid knows nothing of these.
+  for (const auto &[one, other] : dembark_liggghts::excluded_types(*neighbor))
+    if ((atom->type[i] == one && setflag[other][other]) || (atom->type[i] == other && setflag[one][one]))
+      return "of the fluid is excluded from pairs by neigh_modify exclude type " + std::to_string(one) + " " + std::to_string(other) +
+             "; leave what has no forces with the fluid out of pair_coeff instead";
+  for (const auto &[one, other] : dembark_liggghts::excluded_groups(*neighbor))
+    if (atom->mask[i] & (one | other))
+      return "of the fluid is in a group of neigh_modify exclude group; leave what has no forces with the fluid out of pair_coeff instead";
   const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
   if (!(std::fabs(mass - due) <= 1e-6 * due))
     return "of the fluid has the mass " + text(mass) + " kg where density * spacing^" + std::to_string(s.dimension) + " is " + text(due) +
@@ -241,22 +247,24 @@ void PairSphCoupled::sort_particles() {
     particle.number = int(atoms.size());
     atoms.push_back(i);
   }
-  const auto resize = [](auto &particles, const std::vector<int> &atoms) {
+  const auto place = [this](auto &particles, const std::vector<int> &atoms) {
     particles.position.resize(atoms.size());
     particles.velocity.resize(atoms.size());
     particles.density.resize(atoms.size());
     particles.pressure.resize(atoms.size());
+    for (std::size_t k = 0; k < atoms.size(); ++k) particles.position[k] = vector(atom->x[atoms[k]]);
   };
-  resize(fluid, atoms_[0]);
+  place(fluid, atoms_[0]);
   fluid.shift.resize(fluid.id.size());
-  for (std::size_t s = 0; s < 2; ++s) resize(scene_.solids[s], atoms_[1 + s]);
-  rows_.build(particle_, atom->nlocal, scene_, [this](const auto &pair) {
-    for (int ii = 0; ii < list->inum; ++ii) {
-      const int i = list->ilist[ii];
-      for (int k = 0; k < list->numneigh[i]; ++k) pair(i, list->firstneigh[i][k] & NEIGHMASK);
-    }
-  });
-  scene_.resize(vector(domain->boxhi) + Vector{1e3 * (domain->xprd + scene_.settings.h()), 0.0, 0.0});
+  for (std::size_t s = 0; s < 2; ++s) place(scene_.solids[s], atoms_[1 + s]);
+  try {
+    neighbours_.build(scene_, support * scene_.settings.h() + neighbor->skin);
+  } catch (const std::runtime_error &wrong) {
+    error->one(FLERR, (std::string("Pair sph/coupled: ") + wrong.what()).c_str());
+  }
+  // The fluid of this rank has been sorted.
+  std::copy(fluid.id.begin(), fluid.id.end(), atoms_[0].begin());
+  for (std::size_t k = 0; k < fluid.id.size(); ++k) particle_[fluid.id[k]].number = int(k);
 }
 
 /// The scene as the atoms and bodies are.

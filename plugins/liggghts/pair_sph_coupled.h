@@ -1,8 +1,9 @@
 // pair_style sph/coupled spacing DX sound_speed C ...: weakly compressible fluid with walls and rigid bodies, the terms of dembark/sph.
 //
 // fix nve/sph/coupled says which atoms are fluid and moves them; fix sph/wall and fix sph/body say which are solid. The passes of a step
-// are those of dembark/sph/passes.hpp; here atoms become its scene, the engine's neighbours its rows, and ghosts get what the passes have
-// computed of their atoms on other ranks.
+// are those of dembark/sph/passes.hpp; here atoms become its scene, and ghosts get what the passes have computed of their atoms on other
+// ranks. Neighbours are found by dembark/sph/neighbours.hpp when the engine rebuilds its lists: those would hold walls, too, with all their
+// neighbours in walls.
 #ifdef PAIR_CLASS
 
 PairStyle(sph / coupled, PairSphCoupled)
@@ -18,9 +19,9 @@ PairStyle(sph / coupled, PairSphCoupled)
 
 #include "pair.h"
 
+#include "dembark/sph/neighbours.hpp"
 #include "dembark/sph/passes.hpp"
 #include "sph_films.h"
-#include "sph_rows.h"
 
 namespace LAMMPS_NS {
 
@@ -79,7 +80,7 @@ class PairSphCoupled : public Pair {
   std::vector<class FixSphBody *> solids_;               // the bodies of the scene
   std::vector<dembark_liggghts::SphParticle> particle_;  // of each atom
   std::vector<int> atoms_[3];                            // of each role
-  dembark_liggghts::SphRows rows_;
+  dembark::sph::Neighbours neighbours_;
   bool walls_to_ghosts_ = false;  // what pack_comm() sends: pressures and velocities of solids, else densities
 };
 

@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "pointers.h"
-#include "sph_rows.h"
+
+#include "dembark/sph/scene.hpp"
+#include "sph_particle.h"
 
 namespace LAMMPS_NS {
 class FixSphBody;

@@ -20,7 +20,7 @@ communicate single vel yes
 {grid}
 {begin}
 neighbor 0.0052 bin
-neigh_modify delay 0 check yes exclude type 2 3
+neigh_modify delay 0 check yes
 pair_style sph/coupled spacing 0.02 sound_speed 20
 pair_coeff * *
 timestep 2e-4

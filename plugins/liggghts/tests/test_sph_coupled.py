@@ -175,6 +175,9 @@ REFUSED = {
     "moved wall": ("fix weight", "fix paddle g2 move linear 0.1 0 NULL\nfix weight",
                    "fix paddle (move) moves its particles; give this fix the motion by velocity, spin and centre"),
     "moved wall, first": ("fix wall g2", "fix paddle g2 move linear 0.1 0 NULL\nfix wall g2", "fix paddle (move) moves its particles"),
+    "excluded types": ("fix weight", "neigh_modify exclude type 1 2\nfix weight",
+                       "of the fluid is excluded from pairs by neigh_modify exclude type 1 2; leave what has no forces with the fluid"),
+    "excluded groups": ("fix weight", "neigh_modify exclude group g2 g1\nfix weight", "of the fluid is in a group of neigh_modify exclude"),
     "moved body": ("fix weight", "fix paddle all move linear 0.1 0 NULL\nfix weight", "fix paddle (move) moves its particles"),
 }
 

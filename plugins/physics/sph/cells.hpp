@@ -91,9 +91,8 @@ class Grid {
 /// Points in the order of their cells.
 class CellOrder {
  public:
-  /// Sorts n points; member(k) is the k-th in the order of the cells, those of a cell in the order they were given in.
-  void sort(const Grid& grid, const std::vector<Vector>& points) {
-    const std::size_t n = points.size();
+  /// Sorts n points; members()[k] is the k-th in the order of the cells, those of a cell in the order they were given in.
+  void sort(const Grid& grid, const Vector* points, std::size_t n) {
     start_.assign(std::size_t(grid.cells()) + 1, 0);
     cell_.resize(n);
     member_.resize(n);
@@ -162,6 +161,7 @@ inline void pair_rows(const Grid& grid, const CellOrder& order, const std::vecto
 /// Appends all of `others`, in the order of their cells, near p; map: numbers of the others, or nullptr.
 inline void append_row(const Grid& grid, const Vector& p, const CellOrder& order, const std::vector<Vector>& others, const int* map,
                        std::vector<int>& out) {
+  if (others.empty()) return;
   grid.rows(p, false,
             [&](int first, int last, int) { append_near(p, grid.reach(), others.data(), order.begin(first), order.end(last), map, out); });
 }

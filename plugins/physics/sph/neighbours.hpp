@@ -13,13 +13,15 @@ namespace dembark::sph {
 
 class Neighbours {
  public:
-  /// Sorts the fluid and finds all pairs within `reach` (m). Throws std::runtime_error when particles are spread too far.
+  /// Sorts the fluid of this process, `id` with it, and finds all pairs within `reach` (m); images keep their numbers. Throws
+  /// std::runtime_error when particles are spread too far.
   void build(Scene& scene, double reach) {
     FluidParticles& fluid = scene.fluid;
     std::vector<Solids>& solids = scene.solids;
     const int threads = scene.settings.threads;
     const Vector far = set_grid(fluid, solids, reach);
-    order_.sort(grid_, fluid.position);
+    const int n = fluid.size(), all = fluid.with_images(), slabs = (grid_.layers() + 1) / 2, layer = grid_.cells_of_layer();
+    order_.sort(grid_, fluid.position.data(), std::size_t(n));
     const std::vector<int>& members = order_.members();
     permute(members, fluid.position);
     permute(members, fluid.velocity);
@@ -30,35 +32,33 @@ class Neighbours {
     permute(members, fluid.id);
     at_build_ = fluid.position;
     solids_at_build_.clear();
-    const int n = fluid.size(), slabs = (grid_.layers() + 1) / 2, layer = grid_.cells_of_layer();
     std::vector<Rows>& pairs = fluid.pairs;
     pairs.resize(std::size_t(slabs));
     for (int s = 0; s < slabs; ++s) pairs[s].clear(order_.begin(2 * s * layer), s + 1 < slabs ? order_.begin(2 * (s + 1) * layer) : n);
-    parallel_for(slabs, threads, [&](int s) { pair_rows(grid_, order_, fluid.position, n, pairs[s]); });
+    parallel_for(slabs, threads, [&](int s) { pair_rows(grid_, order_, fluid.position, all, pairs[s]); });
+    images_.sort(grid_, fluid.position, n, all, [](const Vector&) { return true; });
+    fluid.border.clear(0, n);
+    all_rows(grid_, fluid.position, images_.order, images_.places, images_.numbers.data(), all, fluid.border);
     for (Solids& set : solids) {
       solids_at_build_.push_back(set.position);
-      near_.clear();
-      for (int k = 0; k < set.size(); ++k)
-        if (inside(set.position[k], reach)) near_.push_back(k);
-      sorted_.resize(near_.size());
-      for (std::size_t k = 0; k < near_.size(); ++k) sorted_[k] = set.position[near_[k]];
-      near_order_.sort(grid_, sorted_);
-      std::vector<int> numbers(near_.size());
-      for (std::size_t k = 0; k < near_.size(); ++k) numbers[k] = near_[near_order_.members()[k]];
-      for (std::size_t k = 0; k < near_.size(); ++k) sorted_[k] = set.position[numbers[k]];
+      near_.sort(grid_, set.position, 0, set.with_images(), [&](const Vector& p) { return inside(p, reach); });
       set.of_fluid.resize(pairs.size());
       parallel_for(slabs, threads, [&](int s) {
         Rows& rows = set.of_fluid[s];
         rows.clear(pairs[s].begin, pairs[s].end);
-        all_rows(grid_, fluid.position, near_order_, sorted_, numbers.data(), set.size(), rows);
+        all_rows(grid_, fluid.position, near_.order, near_.places, near_.numbers.data(), set.with_images(), rows);
       });
       set.near_fluid.resize((std::size_t(set.size()) + block - 1) / block);
       parallel_for(int(set.near_fluid.size()), threads, [&](int b) {
         Rows& rows = set.near_fluid[b];
         rows.clear(b * block, std::min((b + 1) * block, set.size()));
         for (int k = rows.begin; k < rows.end; ++k) {
-          if (inside(set.position[k], reach)) append_row(grid_, set.position[k], order_, fluid.position, nullptr, rows.neighbour);
-          rows.end_row(n);
+          const Vector& p = set.position[k];
+          if (inside(p, reach)) {
+            append_row(grid_, p, order_, fluid.position, nullptr, rows.neighbour);
+            append_row(grid_, p, images_.order, images_.places, images_.numbers.data(), rows.neighbour);
+          }
+          rows.end_row(all);
         }
       });
     }
@@ -79,9 +79,34 @@ class Neighbours {
   long builds() const { return builds_; }
 
  private:
+  /// Some of the particles first ... last - 1 of an array, in the order of their cells: their numbers there, and places (m).
+  struct Sorted {
+    CellOrder order;
+    std::vector<int> numbers;
+    std::vector<Vector> places;
+
+    template <class Taken>
+    void sort(const Grid& grid, const std::vector<Vector>& positions, int first, int last, const Taken& taken) {
+      taken_.clear();
+      unsorted_.clear();
+      for (int k = first; k < last; ++k)
+        if (taken(positions[k])) taken_.push_back(k), unsorted_.push_back(positions[k]);
+      order.sort(grid, unsorted_.data(), unsorted_.size());
+      numbers.clear();
+      places.clear();
+      for (const int m : order.members()) numbers.push_back(taken_[m]), places.push_back(unsorted_[m]);
+    }
+
+   private:
+    std::vector<int> taken_;
+    std::vector<Vector> unsorted_;
+  };
+
+  /// What is not there, as accelerations in engines that have their own, stays away.
   template <class T>
   static void permute(const std::vector<int>& members, std::vector<T>& values) {
-    std::vector<T> sorted(values.size());
+    if (values.empty()) return;
+    std::vector<T> sorted = values;
     for (std::size_t k = 0; k < members.size(); ++k) sorted[k] = values[members[k]];
     values.swap(sorted);
   }
@@ -102,6 +127,7 @@ class Neighbours {
       high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
     };
     for (const Vector& p : fluid.position) take(p);
+    if (fluid.position.empty()) low = high = {};
     grid_.set(low, high, reach);
     low_ = low;
     high_ = high;
@@ -119,9 +145,9 @@ class Neighbours {
   static constexpr int block = 256;  // of rows of solid particles
 
   Grid grid_;
-  CellOrder order_, near_order_;
-  std::vector<Vector> at_build_, sorted_;
-  std::vector<int> near_;
+  CellOrder order_;
+  Sorted images_, near_;  // of the fluid; of solids near it
+  std::vector<Vector> at_build_;
   std::vector<std::vector<Vector>> solids_at_build_;
   Vector low_{}, high_{};
   bool fresh_ = false;

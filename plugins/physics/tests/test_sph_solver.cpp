@@ -92,50 +92,62 @@ TEST_CASE("SPH cells: rows hold all pairs within the reach, once", "[sph]") {
     std::uniform_real_distribution<double> u(0.0, 1.0);
     Scene scene;
     FluidParticles& fluid = scene.fluid;
-    std::vector<Solids>& solids = scene.solids;
-    const int n = 600;
-    for (int i = 0; i < n; ++i) {
-      fluid.position.push_back({3.0 * u(random), u(random), plane ? 0.0 : 0.7 * u(random)});
-      fluid.id.push_back(i);
+    Solids& solids = scene.solids[0];
+    const int n = 600, images = 150, solid = 300, solid_images = 80;
+    for (int i = 0; i < n + images; ++i) {
+      // Images are all around, as those of other processes are.
+      const double from = i < n ? 0.0 : -0.3, length = i < n ? 1.0 : 1.6;
+      fluid.position.push_back({3.0 * (from + length * u(random)), from + length * u(random), plane ? 0.0 : 0.7 * u(random)});
+      if (i < n) fluid.id.push_back(i);
     }
-    fluid.velocity = fluid.acceleration = fluid.shift = fluid.position;
-    fluid.density.resize(n), fluid.pressure.resize(n);
-    for (int k = 0; k < 300; ++k) {
-      solids[0].add(0, {}, 1.0);
-      solids[0].position.back() = {4.0 * u(random) - 0.5, 2.0 * u(random) - 0.5, plane ? 0.0 : u(random)};
+    const std::vector<Vector> given = fluid.position;
+    fluid.velocity = fluid.position;
+    fluid.density.resize(given.size()), fluid.pressure.resize(given.size());
+    for (int k = 0; k < solid + solid_images; ++k) {
+      const Vector p{4.0 * u(random) - 0.5, 2.0 * u(random) - 0.5, plane ? 0.0 : u(random)};
+      if (k < solid) solids.add(0, {}, 1.0);
+      else solids.position.emplace_back();
+      solids.position.back() = p;
     }
     Neighbours neighbours;
     const double reach = 0.21;
     neighbours.build(scene, reach);
-    const auto near = [&](const Vector& a, const Vector& b) { return dot(a - b, a - b) < reach * reach; };
-    std::set<std::pair<int, int>> found, due;
-    for (const Rows& rows : fluid.pairs)
-      for (int i = rows.begin; i < rows.end; ++i)
-        for (int k = rows.start[i - rows.begin]; k < rows.start[i - rows.begin + 1]; ++k)
-          if (rows.neighbour[k] < n) {
-            CHECK(rows.neighbour[k] > i);
-            CHECK(found.insert({i, rows.neighbour[k]}).second);
-          }
-    for (int i = 0; i < n; ++i)
-      for (int j = i + 1; j < n; ++j)
-        if (near(fluid.position[i], fluid.position[j])) due.insert({i, j});
-    CHECK(found == due);
-    std::set<std::pair<int, int>> forth, back;
-    for (const Rows& rows : solids[0].of_fluid)
-      for (int i = rows.begin; i < rows.end; ++i)
-        for (int k = rows.start[i - rows.begin]; k < rows.start[i - rows.begin + 1]; ++k)
-          if (rows.neighbour[k] < solids[0].size()) forth.insert({i, rows.neighbour[k]});
-    for (const Rows& rows : solids[0].near_fluid)
-      for (int j = rows.begin; j < rows.end; ++j)
-        for (int k = rows.start[j - rows.begin]; k < rows.start[j - rows.begin + 1]; ++k)
-          if (rows.neighbour[k] < n) back.insert({rows.neighbour[k], j});
-    due.clear();
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < solids[0].size(); ++j)
-        if (near(fluid.position[i], solids[0].position[j])) due.insert({i, j});
-    CHECK(forth == due);
-    CHECK(back == due);
+    for (int i = 0; i < n + images; ++i) {
+      const std::size_t before = std::size_t(i < n ? fluid.id[i] : i);
+      CHECK(norm(fluid.position[i] - given[before]) + norm(fluid.velocity[i] - given[before]) == 0.0);
+    }
+    typedef std::set<std::pair<int, int>> Pairs;
+    const auto found = [](const std::vector<Rows>& rows, int none) {
+      Pairs pairs;
+      for (const Rows& each : rows) each.each(none, [&](int i, int j) { CHECK(pairs.insert({i, j}).second); });
+      return pairs;
+    };
+    const auto due = [&](const std::vector<Vector>& ones, int one_end, const std::vector<Vector>& others, int begin, int end) {
+      Pairs pairs;
+      for (int i = 0; i < one_end; ++i)
+        for (int j = begin; j < end; ++j)
+          if (const Vector d = ones[i] - others[j]; dot(d, d) < reach * reach) pairs.insert({i, j});
+      return pairs;
+    };
+    const int all = fluid.with_images(), all_solids = solids.with_images();
+    Pairs once;
+    for (const auto& [i, j] : due(fluid.position, n, fluid.position, 0, n))
+      if (i < j) once.insert({i, j});
+    CHECK(found(fluid.pairs, all) == once);
+    CHECK(found({fluid.border}, all) == due(fluid.position, n, fluid.position, n, all));
+    CHECK(found(solids.of_fluid, all_solids) == due(fluid.position, n, solids.position, 0, all_solids));
+    CHECK(found(solids.near_fluid, all) == due(solids.position, solid, fluid.position, 0, all));
   }
+}
+
+TEST_CASE("SPH cells: a process without fluid has no pairs", "[sph]") {
+  Scene scene;
+  scene.solids[0].add(0, {}, 1.0);
+  scene.solids[0].position.back() = {5.0, 5.0, 5.0};
+  Neighbours().build(scene, 0.1);
+  CHECK(scene.fluid.border.neighbour.empty());
+  for (const Rows& rows : scene.fluid.pairs) CHECK(rows.neighbour.empty());
+  for (const Rows& rows : scene.solids[0].near_fluid) CHECK(rows.neighbour.empty());
 }
 
 TEST_CASE("SPH solver: momentum and angular momentum are conserved, with a free body", "[sph]") {
