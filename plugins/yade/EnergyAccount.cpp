@@ -9,6 +9,7 @@
 #include <boost/weak_ptr.hpp>
 
 #include <core/Body.hpp>
+#include <core/Clump.hpp>
 #include <core/GlobalEngine.hpp>
 #include <core/Omega.hpp>
 #include <core/Scene.hpp>
@@ -61,20 +62,37 @@ private:
 		Real                     half = 0.0, work = 0.0;  // J, of the normal spring: in the half step up to here, and in the step
 	};
 
+	/// A body of unequal moments that turns freely: how its angular momentum changes it, the integrator knows. Its energy of rotation
+	/// and the work of the torque on it are counted apart from the motion along the axes.
+	struct Turning {
+		bool     own    = false;
+		Real     energy = 0.0;                                           // J, before the step
+		Vector3r torque = Vector3r::Zero(), damping = Vector3r::Zero();  // N m; what numerical damping has in that
+	};
+	/// Of a member of a clump: the clump, which moves it, and the arm (m) from the clump's centre of mass.
+	struct Member {
+		Body::id_t clump = Body::ID_NONE;
+		Vector3r   arm   = Vector3r::Zero();
+	};
+
 	const NewtonIntegrator& integrator() const;
 	void                    update();
 	void                    tally(const Scene&);
 	void                    record(const NewtonIntegrator&, bool first);
 	bool                    recordBodies(const NewtonIntegrator&, bool first);
+	bool                    recordMember(const Body&);
 	void                    recordForces(const Body&, const NewtonIntegrator&);
 	void                    recordContact(Contact&, const Interaction&) const;
 	bool                    changes(const Contact& c) const { return c.acting && (changed[c.one] || changed[c.two]); }
+	::dembark::EnergyBody   counted(std::size_t k) const;
 	void                    begin();
 
 	::dembark::EnergyLedger            ledger;
 	std::vector<const Body*>           present;  // by id, to tell whether it is still the same; to own it could mean to end a Python
 	                                             // object without the interpreter
 	std::vector<::dembark::EnergyBody> bodies;   // by id, before the step that is to be tallied, and then in the mean of it
+	std::vector<Turning>               turning;  // by id
+	std::vector<Member>                members;  // by id
 	std::vector<bool>                  changed;  // by id: came, left, or is another one than a step ago
 	std::vector<Contact>               contacts;
 	bool                               pending  = false;  // the step `recorded` is not in the sums yet
@@ -111,6 +129,12 @@ Vector3r dampingAcceleration(Real share, const Vector3r& acceleration, const Vec
 	for (int i = 0; i < 3; ++i)
 		change[i] = -share * math::sign(acceleration[i] * (velocity[i] + 0.5 * dt * acceleration[i])) * acceleration[i];
 	return change;
+}
+
+/// J, of the rotation of a body about its centre of mass.
+Real turningEnergy(const State& state) {
+	const Vector3r spin = state.ori.conjugate() * state.angVel;
+	return 0.5 * spin.dot(state.inertia.cwiseProduct(spin));
 }
 
 std::string bodyName(Body::id_t id) { return "EnergyAccount: body " + std::to_string(id); }
@@ -178,6 +202,8 @@ void EnergyAccount::begin() {
 	known.clear();
 	present.clear();
 	bodies.clear();
+	turning.clear();
+	members.clear();
 	contacts.clear();
 }
 
@@ -188,30 +214,60 @@ void EnergyAccount::reset() {
 	step    = -1;
 }
 
+/// Takes up the place of a member in its clump. Returns whether the body is one.
+bool EnergyAccount::recordMember(const Body& body) {
+	Member& member = members[body.getId()];
+	member         = {};
+	if (!body.isClumpMember()) return false;
+	member = {body.clumpId, body.state->pos - Body::byId(body.clumpId, scene)->state->pos};
+	return true;
+}
+
 /// What acts on a body in this step.
 void EnergyAccount::recordForces(const Body& body, const NewtonIntegrator& newton) {
 	const Body::id_t id    = body.getId();
 	EnergyBody&      moved = bodies[id];
 	const State&     state = *body.state;
-	if (!body.isStandalone()) fail(bodyName(id) + " belongs to a clump, whose rotation cannot be tallied; use single spheres");
-	if (newton.exactAsphericalRot && body.isAspherical() && moved.is_free(3) && moved.is_free(4) && moved.is_free(5))
-		fail(bodyName(id) +
-		     " is aspherical and turns by another rule than spheres; block its rotation, or set "
-		     "NewtonIntegrator.exactAsphericalRot to False");
-	moved.velocity = sixVector(state.vel, state.angVel);
-	if (moved.mass == ::dembark::SixVector{}) return moved.set_forces({}, {});
-	const Vector3r force = scene->forces.getForce(id), torque = scene->forces.getTorque(id);
-	const Vector3r weight  = state.mass * newton.gravity;
+	moved.velocity         = sixVector(state.vel, state.angVel);
+	turning[id]            = {};
+	if (moved.mass == ::dembark::SixVector{} || body.isClumpMember()) return moved.set_forces({}, {});
+	if (body.isClump() && !moved.is_free())
+		fail("EnergyAccount: clump " + std::to_string(id) +
+		     " has some of its degrees of freedom blocked; block none or all of them");
+	Vector3r force = Vector3r::Zero(), torque = Vector3r::Zero();
+	if (body.isClump()) static_cast<Clump&>(*body.shape).addForceTorqueFromMembers(&state, scene, force, torque);
+	force += scene->forces.getForce(id);
+	torque += scene->forces.getTorque(id);
+	const bool     turns = newton.exactAsphericalRot && body.isAspherical() && moved.is_free(3) && moved.is_free(4) && moved.is_free(5);
+	const bool     isDamped = newton.damping != 0.0 && state.isDamped;
+	const Vector3r weight   = state.mass * newton.gravity;
 	Vector3r       damping = Vector3r::Zero(), dampingTorque = Vector3r::Zero();
-	if (newton.damping != 0.0 && state.isDamped) {
+	if (isDamped) {
 		Vector3r acceleration = force / state.mass;
 		if (newton.dampGravity) acceleration += newton.gravity;
-		const Vector3r turning = torque.cwiseQuotient(state.inertia);
-		damping                = state.mass * dampingAcceleration(newton.damping, acceleration, state.vel, scene->dt);
-		dampingTorque          = state.inertia.cwiseProduct(dampingAcceleration(newton.damping, turning, state.angVel, scene->dt));
+		damping = state.mass * dampingAcceleration(newton.damping, acceleration, state.vel, scene->dt);
+	}
+	if (isDamped && turns) {
+		for (int i = 0; i < 3; ++i) dampingTorque[i] = -newton.damping * math::sign(torque[i] * state.angVel[i]) * torque[i];
+	} else if (isDamped) {
+		const Vector3r acceleration = torque.cwiseQuotient(state.inertia);
+		dampingTorque = state.inertia.cwiseProduct(dampingAcceleration(newton.damping, acceleration, state.angVel, scene->dt));
+	}
+	if (turns) {
+		turning[id] = {true, turningEnergy(state), torque + dampingTorque, dampingTorque};
+		torque      = Vector3r::Zero();
+		dampingTorque.setZero();
 	}
 	moved.set_forces(sixVector(force + weight + damping, torque + dampingTorque), sixVector(weight, Vector3r::Zero()),
 	                 sixVector(damping, dampingTorque));
+}
+
+/// The motion along the axes alone of a body that turns, else all of it.
+::dembark::EnergyBody EnergyAccount::counted(std::size_t k) const {
+	EnergyBody body = bodies[k];
+	if (members[k].clump != Body::ID_NONE) body.mass = {};
+	if (turning[k].own) body.mass[3] = body.mass[4] = body.mass[5] = 0.0;
+	return body;
 }
 
 /// Takes up the bodies as they are before the step. Returns whether any of them came, left, or is another one than a step ago.
@@ -221,6 +277,8 @@ bool EnergyAccount::recordBodies(const NewtonIntegrator& newton, bool first) {
 	known.resize(count, -1.0);
 	present.resize(count, nullptr);
 	bodies.resize(count);
+	turning.resize(count);
+	members.resize(count);
 	changed.assign(count, false);
 	ledger.kinetic = 0.0;
 	bool any       = false;
@@ -228,15 +286,16 @@ bool EnergyAccount::recordBodies(const NewtonIntegrator& newton, bool first) {
 		const Body* const body = k < all.size() ? all[k].get() : nullptr;
 		const Real        had  = known[k];
 		if (body) {
-			const bool           moves = newton.mask <= 0 || body->maskCompatible(newton.mask);
-			::dembark::SixVector mass  = sixVector(Vector3r::Constant(body->state->mass), body->state->inertia);
+			const Body&          mover = recordMember(*body) ? *Body::byId(body->clumpId, scene) : *body;
+			const bool           moves = newton.mask <= 0 || mover.maskCompatible(newton.mask);
+			::dembark::SixVector mass  = sixVector(Vector3r::Constant(mover.state->mass), mover.state->inertia);
 			for (std::size_t i = 0; i < mass.size(); ++i)
-				if (!moves || body->state->blockedDOFs >> i & 1) mass[i] = 0.0;
+				if (!moves || mover.state->blockedDOFs >> i & 1) mass[i] = 0.0;
 			// After loading nothing is known of a body but its energy.
 			changed[k]     = had < 0.0 || (present[k] && (present[k] != body || bodies[k].mass != mass));
 			bodies[k].mass = mass;
 			recordForces(*body, newton);
-			known[k] = bodies[k].kinetic();
+			known[k] = counted(k).kinetic() + turning[k].energy;
 			ledger.kinetic += known[k];
 		} else {
 			changed[k] = had >= 0.0;
@@ -349,8 +408,24 @@ void EnergyAccount::tally(const Scene& after) {
 		const auto        velocity = !driven.empty() && driven[k] ? *driven[k]
 		                             : now == present[k]          ? sixVector(now->state->vel, now->state->angVel)
 		                                                          : body.kicked(length);
-		known[k]                   = ledger.arrive(body, length, velocity);
-		ledger.now.add_body(body);
+		EnergyBody        along    = counted(k);
+		known[k]                   = ledger.arrive(along, length, velocity);
+		ledger.now.add_body(along);
+		body.velocity = along.velocity;
+		if (!turning[k].own) continue;
+		const Real                  energy = now == present[k] ? turningEnergy(*now->state) : turning[k].energy;
+		const ::dembark::SixVector& mean   = body.velocity;
+		const Vector3r              spin(mean[3], mean[4], mean[5]);
+		known[k] += energy;
+		ledger.kinetic += energy;
+		ledger.now.power[::dembark::Powers::all] += turning[k].torque.dot(spin);
+		ledger.now.power[::dembark::Powers::damping] += turning[k].damping.dot(spin);
+	}
+	for (std::size_t k = 0; k < bodies.size(); ++k) {
+		if (!present[k] || members[k].clump == Body::ID_NONE) continue;
+		const ::dembark::SixVector& mean = bodies[std::size_t(members[k].clump)].velocity;
+		const Vector3r              spin(mean[3], mean[4], mean[5]);
+		bodies[k].velocity = sixVector(Vector3r(Vector3r(mean[0], mean[1], mean[2]) + spin.cross(members[k].arm)), spin);
 	}
 	for (Contact& c : contacts)
 		if (c.acting) c.work = length * ledger.now.add_contact(c.parts, c.levers, bodies[c.one], bodies[c.two]);
