@@ -10,7 +10,7 @@ import numpy as np
 
 from dembark.input_decks.common.power_law import PowerLawFit, ordered
 from dembark.input_decks.plug_flow import channel
-from dembark.input_decks.plug_flow.channel import Channel, Mask, read_periodic
+from dembark.input_decks.plug_flow.channel import Channel, Mask, read_periodic, unsteady
 from dembark.postproc.measurement import Array, Curve, Estimate, Measurement, Points, Replicas, Value, exact, pooled, profile
 from dembark.postproc.studies import quantity
 
@@ -70,14 +70,14 @@ def measure(replicas: Replicas) -> Measurement:
     """Values, profiles and remarks of all replicas of a series."""
     channels = [read_periodic(replica) for replica in replicas]
     found = [estimates(one) for one in channels]
-    unsteady, zero = next((one.remark for one in channels if one.remark), ""), exact(0.0)
+    reason, zero = next((one.remark for one in channels if one.remark), unsteady([one.course for one in channels])), exact(0.0)
     references = {"core_flatness": zero, "force_balance_error": zero}
     details = {"wall_mobilisation": f"the wall's static friction is {replicas[0].derived['wall_static']:g}"}
-    values = {name: Value(pooled(found, name), references.get(name), reason=unsteady if name in FLOW else "",
+    values = {name: Value(pooled(found, name), references.get(name), reason=reason if name in FLOW else "",
                           detail=details.get(name, "")) for name in found[0]}
-    share = channels[0].steady_share
-    remark = f"The steady part holds {share:.0%} of the measuring window (MSER-5 and a drift test on the kinetic energy)."
-    return Measurement(values, profiles(channels), [unsteady[0].upper() + unsteady[1:] + "." if unsteady else remark])
+    share = float(np.mean([one.steady_share for one in channels]))
+    remark = f"Steady parts hold {share:.0%} of the measuring windows (MSER-5 and a drift test on the kinetic energy)."
+    return Measurement(values, profiles(channels), [reason[0].upper() + reason[1:] + "." if reason else remark])
 
 
 def study(_name: str, points: Points, along: str) -> Measurement:

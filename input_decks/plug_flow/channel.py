@@ -37,12 +37,33 @@ def _ratio(above: Array, below: Array) -> Array:
 
 
 @dataclass(frozen=True)
+class Course:
+    """`series` (rows,) at the steps `when`, and the steps of the frames in the measuring window."""
+
+    series: Array
+    when: Array
+    frames: NDArray[np.int64]
+
+    def steady_part(self) -> tuple[int, str]:
+        """First step of the steady part of the measuring window; and '' or the reason why there is none (then the window's second half is
+        used)."""
+        # Rows are far closer in time than the memory of what they show: with about 200 of them MSER's batches are long against it.
+        thin = max(1, len(self.series) // 200)
+        thinned = self.series[: len(self.series) // thin * thin].reshape(-1, thin).mean(axis=1)
+        start, middle = steady_start(thinned), int(self.frames[len(self.frames) // 2])
+        if start >= len(thinned) or self.when[start * thin] > middle:
+            return middle, "no steady part was found in the measuring window; its second half was used"
+        return int(self.when[start * thin]), ""
+
+
+@dataclass(frozen=True)
 class Channel:
     """One replica, steady part: arrays over frames, cells across (x) and bands of height (z), in SI units. `speed` (m/s): the scale of
     velocities. `solid` (m3), `flow` = sum V v (m4/s), `flow2` = sum V v^2 are (frames, cells, bands); `pressure` (frames, cells);
     `track` (frames, grains, 3): places (m) of all moving grains at the times `clock` (s); `grain_place`, `grain_speed`: mean x (m) and
     Lagrangian velocity (m/s) of those that stay; `core_motion`: that of the core from frame to frame; `normal`, `shear` (frames, bands, 2):
-    stresses (Pa) of the left and right wall. `remark`: why it is not steady, or ''."""
+    stresses (Pa) of the left and right wall; `course`: what shows the steady part, over the time in which it is looked for. `remark`: why
+    nothing is said of its flow, or ''."""
 
     edges: Array
     levels: Array
@@ -65,7 +86,8 @@ class Channel:
     force_error: Estimate
     height: float
     steady_share: float
-    remark: str
+    course: Course
+    remark: str = ""
 
     @property
     def middle(self) -> Array:
@@ -219,7 +241,8 @@ def read(replica: Replica) -> Channel:
     outline = np.array([_outline(grains, width * depth) for grains in replica.grains()])
     steps, weight = outline[:, 0].astype(np.int64), outline[0, 3] * float(given["gravity"])
     moving = times["time"] > float(given["settle_time"])
-    start, remark = steady_part((times["left_fz"] + times["right_fz"])[moving], times["step"][moving], steps)
+    course = Course((times["left_fz"] + times["right_fz"])[moving], times["step"][moving], steps)
+    start, _ = course.steady_part()
     used = steps >= start
     bottom, top = outline[used, 1], outline[used, 2]
     low, high = bottom.max() + 2.0 * diameter, top.min() - 2.0 * diameter
@@ -236,7 +259,7 @@ def read(replica: Replica) -> Channel:
     walls = sum(times[f"{wall}_fz"] for wall in ("left", "right", "front", "rear", "base") if f"{wall}_fz" in times)
     return joined(given, rows, track, stays, steps[used].astype(float) * replica.time_step, levels=levels, speed=float(given["base_speed"]),
                   force_error=block_mean((walls / weight - 1.0)[times["step"] >= start]), height=float(np.mean(top - bottom)),
-                  steady_share=float(used.mean()), remark=remark)
+                  steady_share=float(used.mean()), course=course)
 
 
 @cached_per_replica
@@ -247,7 +270,8 @@ def read_periodic(replica: Replica) -> Channel:
     given, times, steps = replica.parameters, replica.times(), np.array([frame.step for frame in replica.grains()])
     gravity, width, depth = (float(given[name]) for name in ("gravity", "channel_width", "channel_depth"))
     window = times["step"] > 2 * steps[0] - steps[1]
-    start, remark = steady_part(times["kinetic_energy"][window], times["step"][window], steps)
+    course = Course(times["kinetic_energy"][window], times["step"][window], steps)
+    start, _ = course.steady_part()
     used, edges, speed = steps >= start, cells_across(width, float(given["grain_diameter"])), float(np.sqrt(gravity * width))
     rows, paths, levels, weight = [], [], np.zeros(2), 0.0
     for grains, contacts in _chosen(replica, used):
@@ -256,13 +280,14 @@ def read_periodic(replica: Replica) -> Channel:
         # All grains in the box, where the walls' forces are to be sorted by height.
         rows.append(frame_rows(replace(grains, positions=grains.wrapped), contacts, edges, levels, depth, periodic=True))
     fall, track = np.array([row["flow"].sum() / row["solid"].sum() for row in rows]), np.array(paths)
+    remark = ""
     if fall.mean() < LEAST_SPEED * speed:
         remark = f"the grains are jammed between the walls: they creep at {fall.mean():.2g} m/s"
     friction, when, clock = times["left_fz"] + times["right_fz"], times["step"], steps[used] * replica.time_step
     held = [friction[(when > low) & (when <= high)].mean() / weight for low, high in pairwise(steps[used])]
     return joined(given, rows, track, np.full(track.shape[1], True), clock, levels=levels, speed=speed,
                   force_error=block_mean(np.array(held) - 1.0 + np.diff(fall) / np.diff(clock) / gravity),
-                  height=float(levels[1] - levels[0]), steady_share=float(used.mean()), remark=remark)
+                  height=float(levels[1] - levels[0]), steady_share=float(used.mean()), course=course, remark=remark)
 
 
 Measure = Callable[[Mask, Bands], float]
@@ -320,16 +345,12 @@ def _outline(grains: GrainFrame, area: float) -> tuple[int, float, float, float]
     return grains.step, float((free.positions[:, 2] - free.radii).min()), top, float(free.masses.sum())
 
 
-def steady_part(series: Array, when: Array, steps: NDArray[np.int64]) -> tuple[int, str]:
-    """First step of the steady part of the measuring window, whose frames are at `steps`, by a series with values at the steps `when`; and
-    '' or the reason why there is none (then the window's second half is used)."""
-    # Rows are far closer in time than the memory of what they show: with about 200 of them MSER's batches are long against it.
-    thin = max(1, len(series) // 200)
-    thinned = series[: len(series) // thin * thin].reshape(-1, thin).mean(axis=1)
-    start = steady_start(thinned)
-    if start >= len(thinned) or when[start * thin] > steps[len(steps) // 2]:
-        return int(steps[len(steps) // 2]), "no steady part was found in the measuring window; its second half was used"
-    return int(when[start * thin]), ""
+def unsteady(courses: Sequence[Course]) -> str:
+    """'' when the mean over the packings is steady, or the reason why nothing is said of their flow. A single packing hides a slow drift in
+    its scatter, and one of several fails the test by chance more often than the test allows."""
+    rows = min(len(one.series) for one in courses)
+    mean = np.mean([one.series[:rows] for one in courses], axis=0)
+    return replace(courses[0], series=mean, when=courses[0].when[:rows]).steady_part()[1]
 
 
 def free_grains(grains: GrainFrame, contacts: ContactFrame) -> tuple[GrainFrame, ContactFrame, list[WallContacts]]:

@@ -63,7 +63,7 @@ def measure(replicas: Replicas) -> Measurement:
     channels = [channel.read(replica) for replica in replicas]
     found = [estimates(one) for one in channels]
     over = {name: pooled(found, name) for name in found[0]}
-    first, unsteady, slip = channels[0], next((one.remark for one in channels if one.remark), ""), 1.0 - over["wall_slip"].value
+    first, unsteady, slip = channels[0], channel.unsteady([one.course for one in channels]), 1.0 - over["wall_slip"].value
     faint = f"the layer at the walls lags by only {slip:.1%}: no shear zone to measure" if slip < LEAST_DEFICIT else ""
     values = {name: Value(one) for name, one in over.items()}
     values |= {name: Value(over[name], Estimate(0.0, 0.0), reason=unsteady) for name in JUDGED}
@@ -77,7 +77,8 @@ def measure(replicas: Replicas) -> Measurement:
         values |= {name: Value(one, Estimate(MEASURED[name], 0.0) if name in MEASURED else None, reason=unsteady)
                    for name, one in fluctuations.estimates(motions).items()}
         curves += fluctuations.profiles(motions)
-    steady = f"The steady part holds {first.steady_share:.0%} of the measuring window (MSER-5 and a drift test on the wall friction)."
+    share = float(np.mean([one.steady_share for one in channels]))
+    steady = f"Steady parts hold {share:.0%} of the measuring windows (MSER-5 and a drift test on the wall friction)."
     d, window = first.diameter, first.levels[-1] - first.levels[0]
     size = (f"The channel is {first.width / d:.0f} d wide and filled {first.height / d:.0f} d high; the cells, which are at rest in the "
             f"laboratory frame, cover {window / d:.0f} d of it.")

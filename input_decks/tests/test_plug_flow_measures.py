@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from dembark.common.errors import RunError
 from dembark.input_decks.plug_flow import fluctuations
-from dembark.input_decks.plug_flow.channel import Channel, free_grains, read
+from dembark.input_decks.plug_flow.channel import Channel, Course, free_grains, read, unsteady
 from dembark.input_decks.plug_flow.fluctuations import Motion, Seen
 from dembark.input_decks.tests.measuring import Control, dried, measured, names
 from dembark.input_decks.tests.synthetic import DIAMETER, plug_flow, restated
@@ -66,6 +66,29 @@ def test_grains_glued_to_a_wall_are_the_wall():
     free, kept, (wall,) = free_grains(frame, contacts_of(frame, [1, 2], [2, 3], [[-3.0, 0.0, 0.0], [-2.0, 0.0, 0.0]]))
     assert free.ids.tolist() == [2, 3] and kept.ids.tolist() == [[2, 3]]
     np.testing.assert_allclose([wall.points[0], wall.positions[0], wall.forces[0]], [[0.5, 0.0, 0.0], [1.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
+
+
+def courses(seed: int, drift: float) -> list[Course]:
+    """Of five packings, with a memory of ten rows and a standard deviation of 1: the mean changes by `drift` from the first row to the last
+    one."""
+    chance, rows = np.random.default_rng(seed), np.arange(200)
+    found = []
+    for _ in range(5):
+        series = [chance.normal()]
+        for _ in rows[1:]:
+            series.append(0.9 * series[-1] + np.sqrt(0.19) * chance.normal())
+        found.append(Course(100.0 + np.array(series) + drift * rows / 200.0, rows, np.arange(0, 200, 4)))
+    return found
+
+
+def test_the_mean_over_packings_decides_whether_the_flow_is_steady():
+    """Of steady flow one of five packings seems to drift more often than their mean; a drift of twice the standard deviation shows in the
+    mean more than twice as often as in one packing."""
+    runs = {drift: [courses(seed, drift) for seed in range(100)] for drift in (0.0, 2.0)}
+    alone = {drift: np.mean([bool(one[0].steady_part()[1]) for one in found]) for drift, found in runs.items()}
+    any_alone = np.mean([any(one.steady_part()[1] for one in found) for found in runs[0.0]])
+    together = {drift: np.mean([bool(unsteady(found)) for found in of_drift]) for drift, of_drift in runs.items()}
+    assert together[0.0] < 0.5 * any_alone and together[2.0] > 2.0 * alone[2.0]
 
 
 # Steps from frame to frame, in d: streamwise and transverse.
