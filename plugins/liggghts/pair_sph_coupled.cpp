@@ -118,6 +118,9 @@ void PairSphCoupled::init_style() {
   if (!fluid_fix_) refuse("nothing moves the fluid; add fix ID group nve/sph/coupled, with the group of the fluid");
   scene_.bodies.assign(solids_.size(), Body{});
   films_.clear();
+  if (neighbor->includegroup) refuse("neigh_modify include leaves atoms out whose forces are needed; take it out");
+  // Those that the engine gives a cutoff from here on are the pairs of this style, alone or in a hybrid one.
+  for (int i = 1; i <= atom->ntypes; ++i) std::fill_n(cutsq[i] + 1, atom->ntypes, 0.0);
 }
 
 int PairSphCoupled::number(const FixSphBody *solid) const {
@@ -195,7 +198,11 @@ std::string PairSphCoupled::wrong_with(int i) const {
   if (groups > 0 && s.dimension == 2 && !(std::fabs(atom->x[i][2]) <= 1e-6 * s.spacing))
     return "is at z = " + text(atom->x[i][2]) + " m; in the plane all are at z = 0, one layer of the lattice";
   if (!fluid) return "";
-  // The search for neighbours of the fluid knows nothing of these.
+  // The search for neighbours of the fluid finds all that takes part.
+  for (int t = 1; t <= atom->ntypes; ++t)
+    if (setflag[t][t] && !(cutsq[atom->type[i]][t] > 0.0))
+      return "of the fluid has type " + std::to_string(atom->type[i]) + ", whose pairs with type " + std::to_string(t) +
+             " are not of pair sph/coupled; give them to it by pair_coeff, or leave the pairs of type " + std::to_string(t) + " out, too";
   for (const auto &[one, other] : dembark_liggghts::excluded_types(*neighbor))
     if ((atom->type[i] == one && setflag[other][other]) || (atom->type[i] == other && setflag[one][one]))
       return "of the fluid is excluded from pairs by neigh_modify exclude type " + std::to_string(one) + " " + std::to_string(other) +

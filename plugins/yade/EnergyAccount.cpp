@@ -62,8 +62,8 @@ private:
 		Real                     half = 0.0, work = 0.0;  // J, of the normal spring: in the half step up to here, and in the step
 	};
 
-	/// A body of unequal moments that turns freely: how its angular momentum changes it, the integrator knows. Its energy of rotation
-	/// and the work of the torque on it are counted apart from the motion along the axes.
+	/// A freely turning body of unequal moments: its spin changes without a torque, too, as the integrator computes. Its rotation is
+	/// counted apart from its translation.
 	struct Turning {
 		bool     own    = false;
 		Real     energy = 0.0;                                           // J, before the step
@@ -413,9 +413,10 @@ void EnergyAccount::tally(const Scene& after) {
 		ledger.now.add_body(along);
 		body.velocity = along.velocity;
 		if (!turning[k].own) continue;
-		const Real                  energy = now == present[k] ? turningEnergy(*now->state) : turning[k].energy;
-		const ::dembark::SixVector& mean   = body.velocity;
+		const ::dembark::SixVector& mean = body.velocity;
 		const Vector3r              spin(mean[3], mean[4], mean[5]);
+		const Real                  energy =
+			now == present[k] ? turningEnergy(*now->state) : turning[k].energy + length * turning[k].torque.dot(spin);
 		known[k] += energy;
 		ledger.kinetic += energy;
 		ledger.now.power[::dembark::Powers::all] += turning[k].torque.dot(spin);

@@ -189,6 +189,21 @@ def test_says_what_is_wrong(name: str, tmp_path: Path) -> None:
     assert done.code != 0 and message in done.error, done.error or done.output[-800:]
 
 
+@pytest.mark.parametrize("others", ["* *", "2*3 2*3"])
+def test_pairs_that_are_left_out_are_refused(others: str, tmp_path: Path) -> None:
+    """The fluid finds all that takes part, so that pairs cannot be left out one by one."""
+    coefficients = f"pair_coeff {others} sph/coupled\npair_coeff 1 1 sph/coupled\npair_coeff 1 3 sph/coupled\npair_coeff 1 2 none"
+    done = run_deck(tmp_path, deck(SCENES["dam"], 2, changes=(("pair_style sph/coupled", "pair_style hybrid/overlay sph/coupled"),
+                                                              ("pair_coeff * *", coefficients))))
+    assert done.code != 0 and "has type 1, whose pairs with type 2 are not of pair sph/coupled" in done.error, done.error
+
+
+def test_neighbours_of_a_group_alone_are_refused(tmp_path: Path) -> None:
+    change = ("fix weight", "atom_modify first g1\nneigh_modify include g1\nfix weight")
+    done = run_deck(tmp_path, deck(SCENES["dam"], 2, changes=(change,)))
+    assert done.code != 0 and "neigh_modify include leaves atoms out" in done.error, done.error or done.output[-800:]
+
+
 @pytest.mark.parametrize("name", ["mass", "overlap", *(pytest.param(name, marks=pytest.mark.full) for name in ("two groups", "weight"))])
 def test_what_one_rank_finds_wrong_is_a_line_of_its_own(name: str, tmp_path: Path) -> None:
     """If that rank ended the run by itself, its message could begin in the middle of another's line, with the launcher's words after it."""

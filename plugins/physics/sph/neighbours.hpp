@@ -36,8 +36,9 @@ class Neighbours {
     pairs.resize(std::size_t(slabs));
     for (int s = 0; s < slabs; ++s) pairs[s].clear(order_.begin(2 * s * layer), s + 1 < slabs ? order_.begin(2 * (s + 1) * layer) : n);
     parallel_for(slabs, threads, [&](int s) { pair_rows(grid_, order_, fluid.position, all, pairs[s]); });
-    images_.sort(grid_, fluid.position, n, all, [](const Vector&) { return true; });
-    fluid.border.clear(0, n);
+    fluid.border.clear(0, all > n ? n : 0);
+    images_.places.clear();
+    if (all > n) images_.sort(grid_, fluid.position, n, all, [](const Vector&) { return true; });
     all_rows(grid_, fluid.position, images_.order, images_.places, images_.numbers.data(), all, fluid.border);
     for (Solids& set : solids) {
       solids_at_build_.push_back(set.position);
@@ -102,7 +103,7 @@ class Neighbours {
     std::vector<Vector> unsorted_;
   };
 
-  /// What is not there, as accelerations in engines that have their own, stays away.
+  /// Arrays that an engine does not use stay empty, as accelerations in LIGGGHTS.
   template <class T>
   static void permute(const std::vector<int>& members, std::vector<T>& values) {
     if (values.empty()) return;
