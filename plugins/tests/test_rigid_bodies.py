@@ -142,7 +142,6 @@ set group all mass 0.001
 set group all meso_rho 1000
 group water type 1
 neighbor 0.005 bin
-neigh_modify exclude type 2 2
 pair_style sph/coupled spacing 0.01 sound_speed 10 density 1000
 pair_coeff * *
 timestep 1e-4
