@@ -137,7 +137,8 @@ Real turningEnergy(const State& state) {
 	return 0.5 * spin.dot(state.inertia.cwiseProduct(spin));
 }
 
-std::string bodyName(Body::id_t id) { return "EnergyAccount: body " + std::to_string(id); }
+/// The latter three of six velocities.
+Vector3r spinOf(const ::dembark::SixVector& velocity) { return Vector3r(velocity[3], velocity[4], velocity[5]); }
 
 }  // namespace
 
@@ -413,9 +414,8 @@ void EnergyAccount::tally(const Scene& after) {
 		ledger.now.add_body(along);
 		body.velocity = along.velocity;
 		if (!turning[k].own) continue;
-		const ::dembark::SixVector& mean = body.velocity;
-		const Vector3r              spin(mean[3], mean[4], mean[5]);
-		const Real                  energy =
+		const Vector3r spin = spinOf(body.velocity);
+		const Real     energy =
 			now == present[k] ? turningEnergy(*now->state) : turning[k].energy + length * turning[k].torque.dot(spin);
 		known[k] += energy;
 		ledger.kinetic += energy;
@@ -425,7 +425,7 @@ void EnergyAccount::tally(const Scene& after) {
 	for (std::size_t k = 0; k < bodies.size(); ++k) {
 		if (!present[k] || members[k].clump == Body::ID_NONE) continue;
 		const ::dembark::SixVector& mean = bodies[std::size_t(members[k].clump)].velocity;
-		const Vector3r              spin(mean[3], mean[4], mean[5]);
+		const Vector3r              spin = spinOf(mean);
 		bodies[k].velocity = sixVector(Vector3r(Vector3r(mean[0], mean[1], mean[2]) + spin.cross(members[k].arm)), spin);
 	}
 	for (Contact& c : contacts)
